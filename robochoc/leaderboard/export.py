@@ -7,7 +7,7 @@ from pathlib import Path
 
 from robochoc.experiments.digests import sha256_of_team
 from robochoc.formats.diagnostics import invalid_input
-from robochoc.formats.dialects.dialect import ExportOptions, notes_on_absence
+from robochoc.formats.dialects.dialect import ExportOptions, notes_on_features
 from robochoc.formats.dialects.registry import find_dialect
 from robochoc.formats.team_writer import write_team
 from robochoc.leaderboard.certificates import published
@@ -74,5 +74,5 @@ def export_instance(instance: Instance, kind: str, output: Path | None, *, repla
     for one, (_, content) in zip(paths, contents, strict=True):
         write_atomically(one, content)
         yield f"{one}: {len(content):,} bytes"
-    for note, text in (*written.notes, *notes_on_absence(team)):
+    for note, text in (*written.notes, *notes_on_features(team)):
         yield f"  {note}: {text}"

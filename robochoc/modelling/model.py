@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import copy
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Self
@@ -28,6 +28,7 @@ from robochoc.model.constraint import WhenAbsent
 from robochoc.model.cost_units import PLAIN_COSTS
 from robochoc.model.outcome import Outcome
 from robochoc.model.problem import Team
+from robochoc.model.random_variable import RandomVariable
 from robochoc.modelling.codes import Symbols
 from robochoc.modelling.constraints import ModelConstraint, absence_or_none, check_owned, conditions_in, exact_or_none
 from robochoc.modelling.drafts import ObjectiveTerm, split
@@ -35,6 +36,7 @@ from robochoc.modelling.errors import ModelError, ModelTypeError, SourceLine, Un
 from robochoc.modelling.events import ModelEvent
 from robochoc.modelling.numbers import Exact, check_places, whole_number
 from robochoc.modelling.option_names import errors_in_python
+from robochoc.modelling.random_variables import random_variable, with_decisions
 from robochoc.modelling.robots import ModelRobot, check_robot
 from robochoc.modelling.solution import NamedValues, Solution, UserValues, team_name
 from robochoc.modelling.solving import Solvable
@@ -61,6 +63,7 @@ class Model(Solvable):
         self._objective: list[ObjectiveTerm] = []
         self.constant: Exact = 0
         self.maximized: bool | None = None
+        self.random_variables: list[RandomVariable] = []
         self.given: TeamContents | None = None
         self.imported: Mapping[str, str] = {}
         self._team: Team | None = None
@@ -152,6 +155,30 @@ class Model(Solvable):
         """Add a variable; its name must be free. See `ModelRobot.variable`."""
         self._variables[variable.name] = variable
         self.changed()
+
+    def random(self, name: str, distribution: object, *, seen_by: Iterable[ModelVariable] = ()) -> ModelVariable:
+        """Add a random variable: a number drawn by chance, independently of other random variables.
+
+        Constraints and costs may contain it, besides a variable of a robot. `solve` then minimises the expected cost,
+        or with `risk="worst"` the cost in the worst case.
+
+        Args:
+            name: The name, unique in the model.
+            distribution: The probability of each outcome, an integer: `{0: 0.7, 3: 0.3}`. Probabilities are exact
+                decimals.
+            seen_by: The variables whose values are chosen after the outcome was observed. In a solution such a variable
+                has a value for each outcome, `relay.wind.0` and `relay.wind.3`.
+
+        Returns:
+            The random variable: a term in constraints and costs.
+
+        Raises:
+            ModelError: if an argument is invalid.
+        """
+        made, declared = random_variable(name, distribution, seen_by, self.variables, calling_line())
+        self.random_variables.append(declared)
+        self.add_variable(made)
+        return made
 
     def __getitem__(self, name: str) -> ModelVariable:
         """Return the variable named `name` in the team, such as `drone3.slot`. `name` may also be a CPMpy variable."""
@@ -322,7 +349,7 @@ class Model(Solvable):
 
     def values_of(self, assignment: Mapping[str, int]) -> NamedValues:
         """Return the user's values for the integers in an assignment, such as that of an event or an epoch."""
-        return UserValues(self._variables, None)(assignment)
+        return UserValues(with_decisions(self._variables, self.random_variables), None)(assignment)
 
     def solutions(self, protocol: str = CENTRAL, *, limit: int | None = None, **options: Any) -> Iterator[Solution]:  # noqa: ANN401 - those of `solve`
         """Yield all solutions one by one, the cheapest first if costs are minimised.
@@ -422,7 +449,7 @@ class Model(Solvable):
         return self.given is not None or any(robot.priority for robot in self.robots.values())
 
     def _solution(self, outcome: Outcome, team: Team) -> Solution:
-        return Solution.of(outcome, team, dict(self.variables), self.imported)
+        return Solution.of(outcome, team, with_decisions(self.variables, self.random_variables), self.imported)
 
     def __copy__(self) -> Self:
         """Return an independent copy."""

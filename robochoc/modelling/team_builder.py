@@ -30,6 +30,7 @@ from robochoc.modelling.drafts import Definitions, Draft, costs_of
 from robochoc.modelling.errors import ModelError, SourceLine
 from robochoc.modelling.events import ModelEvent, Removal
 from robochoc.modelling.numbers import places_of
+from robochoc.modelling.random_variables import BY_CHANCE
 from robochoc.modelling.robots import ModelRobot
 from robochoc.modelling.team_contents import changes_in_finer_units
 from robochoc.system.suggestions import did_you_mean
@@ -107,6 +108,9 @@ class _Builder:
         found = []
         for draft in (one for rule in robot.parts for one in rule.drafts()):
             owners = {variable.owner for variable in draft.scope}
+            if BY_CHANCE in owners:
+                message = f"the part known to {robot.name} depends on a random variable"
+                raise ModelError(message, "add it as a constraint that both robots know: Model.add", draft.place)
             if owners <= {robot.name}:
                 self._drafts.append(draft)
             elif robot.name in owners:
@@ -136,6 +140,7 @@ class _Builder:
                 topics={robot.name: robot.topics for robot in self._robots},
                 weights={robot.name: robot.weight for robot in self._robots},
                 parts=parts,
+                random=self._model.random_variables,
                 objectives=[*(given.objectives if given else ()), *filter(None, (one.objective for one in minimised))],
             ),
         )
@@ -143,6 +148,9 @@ class _Builder:
         return with_table_everywhere(whole, symbol_table(team.robots)) if self._model.events else whole
 
     def _finished(self, draft: Draft) -> Constraint:
+        if draft.scope and all(variable.owner == BY_CHANCE for variable in draft.scope):
+            names = " and ".join(variable.name for variable in draft.scope)
+            raise ModelError(f"{draft.name} is over {names} only, which no robot decides", "leave it out", draft.place)
         made = self._definitions.constraint(draft, self._units.places, -1 if self._units.maximize else 1)
         for name in (made.name, made.definition.name):
             self._places.setdefault(name, draft.place)

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from pathlib import Path
 
+from robochoc.formats.dialects.dialect import ImportOptions
+from robochoc.formats.dialects.registry import read_foreign
 from robochoc.model.outcome import Verdict
 from robochoc.model.policies import Risk
+from robochoc.model.uncertainty import is_uncertain
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
 from tests.support.examples import count, drawn
-from tests.support.uncertain import uncertain_problem
+from tests.support.uncertain import frodo_xml, uncertain_problem
 
 PROTOCOLS = ("dpop", "syncbb", "afb", "adopt", "central")
 
@@ -20,6 +24,8 @@ def test_costs_equal_those_of_the_best_policy(problems: int) -> None:
     solved = 0
     for number in range(problems):
         problem = uncertain_problem(chance)
+        if not is_uncertain(problem.team):
+            continue  # no constraint depends on chance
         expected, worst = problem.best()
         protocol = PROTOCOLS[number % len(PROTOCOLS)]
         for risk, wanted in ((Risk.EXPECTED, expected), (Risk.WORST, worst)):
@@ -35,3 +41,20 @@ def test_costs_equal_those_of_the_best_policy(problems: int) -> None:
             assert (report.expected if risk == Risk.EXPECTED else report.worst) == outcome.cost
             solved += 1
     assert solved > problems
+
+
+@count("problems", 15, 300)
+def test_problems_of_frodo_cost_the_same(problems: int, tmp_path: Path) -> None:
+    chance = drawn("uncertainty of FRODO")
+    for number in range(problems):
+        problem = uncertain_problem(chance, observed=False)
+        if not is_uncertain(problem.team):
+            continue
+        file = tmp_path / f"{number}.xml"
+        file.write_text(frodo_xml(problem, digits=chance.choice([1, 17])))
+        team = read_foreign([file], ImportOptions()).team
+        constant = Fraction(problem.units.constant, 10**problem.units.places)  # FRODO has no constant
+        for risk, best in zip((Risk.EXPECTED, Risk.WORST), problem.best(), strict=True):
+            outcome = solve(team, Options(protocol="dpop", runtime=Runtime.SIMULATOR, risk=risk))
+            found = None if outcome.cost is None else Fraction(outcome.cost) + constant
+            assert found == best

@@ -92,7 +92,7 @@ class UncertainProblem:
         return Fraction(total, unit)
 
 
-def uncertain_problem(chance: Random, *, hard: bool = True) -> UncertainProblem:
+def uncertain_problem(chance: Random, *, hard: bool = True, observed: bool = True) -> UncertainProblem:
     """Return a random problem of two to four robots with one or two random variables."""
     number = chance.choice([2, 3, 3, 4])
     names = [f"V{robot}" for robot in range(1, number + 1)]
@@ -102,7 +102,7 @@ def uncertain_problem(chance: Random, *, hard: bool = True) -> UncertainProblem:
     budget = 1
     for place in range(chance.choice([1, 2, 2])):
         outcomes = tuple(sorted(chance.sample(range(-1, 4), chance.choice([2, 2, 3]))))
-        seen = tuple(name for name in names if chance.random() < 0.25 and budget * len(domains[name]) <= 8)
+        seen = tuple(name for name in names if observed and chance.random() < 0.25 and budget * len(domains[name]) <= 8)
         for name in seen:
             budget *= len(domains[name]) ** (len(outcomes) - 1)
         weights = chance.choice(WEIGHTS[len(outcomes)])
@@ -118,6 +118,39 @@ def uncertain_problem(chance: Random, *, hard: bool = True) -> UncertainProblem:
     extras = Extras(random=randoms)
     team = assemble("uncertain", owned, constraints, kind=ProblemKind.DISWCSP, costs=units, extras=extras)
     return UncertainProblem(domains, constraints, randoms, units, team)
+
+
+def frodo_xml(problem: UncertainProblem, digits: int) -> str:
+    """Return a problem in FRODO's format, with probabilities as floating-point numbers of `digits` digits."""
+    unit, infinity = 10**problem.units.places, "-infinity" if problem.units.maximize else "infinity"
+    every = {**problem.domains, **{one.name: one.outcomes for one in problem.random}}
+    domains = [f'<domain name="D{name}">{" ".join(map(str, values))}</domain>' for name, values in every.items()]
+    variables = [f'<variable name="{name}" domain="D{name}" agent="a{name}"/>' for name in problem.domains]
+    variables += [f'<variable name="{one.name}" domain="D{one.name}" type="random"/>' for one in problem.random]
+    laws, relations, constraints = [], [], []
+    for one in problem.random:
+        chances = (f"{weight / 10**one.places:.{digits}f}" for weight in one.weights)
+        text = " | ".join(f"{chance}: {value}" for chance, value in zip(chances, one.outcomes, strict=True))
+        laws.append(f'<probability name="p{one.name}" semantics="soft" arity="1">{text}</probability>')
+        constraints.append(f'<constraint name="c{one.name}" scope="{one.name}" reference="p{one.name}"/>')
+    for constraint in problem.constraints:
+        names, rows = constraint.variables, []
+        one_unit = 1 if isinstance(constraint.definition, Function) else unit
+        for row in itertools.product(*(every[name] for name in names)):
+            price = constraint.price(dict(zip(names, row, strict=True)))
+            cost = infinity if price == INFINITE else f"{price / one_unit:.1f}"
+            rows.append(f"{cost}: {' '.join(map(str, row))}")
+        name = constraint.name
+        arity = f'arity="{len(names)}" semantics="soft"'
+        relations.append(f'<relation name="r{name}" {arity}>{" | ".join(rows)}</relation>')
+        constraints.append(f'<constraint name="{name}" scope="{" ".join(names)}" reference="r{name}"/>')
+    parts = {"domains": domains, "variables": variables, "relations": relations}
+    parts |= {"probabilities": laws, "constraints": constraints}
+    body = "".join(f"<{tag}>{''.join(found)}</{tag}>" for tag, found in parts.items())
+    agents = "".join(f'<agent name="a{name}"/>' for name in problem.domains)
+    sense = str(problem.units.maximize).lower()
+    head = f'<presentation maximize="{sense}" format="XCSP 2.1_FRODO"/><agents>{agents}</agents>'
+    return f"<instance>{head}{body}</instance>"
 
 
 def _constraint(

@@ -70,7 +70,7 @@ def export(folder: Path, kind: str, output: Path | None, intension: bool, **read
 
 def _written(team: Team, kind: str, options: ExportOptions) -> ExportResult:
     """Return the files of `team` in the format `kind`."""
-    from robochoc.formats.dialects.dialect import notes_on_absence
+    from robochoc.formats.dialects.dialect import notes_on_features
     from robochoc.formats.dialects.registry import find_dialect
     from robochoc.model.costs import refuse_several_objectives
 
@@ -79,7 +79,7 @@ def _written(team: Team, kind: str, options: ExportOptions) -> ExportResult:
         raise Failure(USAGE, f"this version cannot write {kind}")
     refuse_several_objectives(team)
     written = dialect.write(team, options)
-    return written._replace(notes=(*written.notes, *notes_on_absence(team)))
+    return written._replace(notes=(*written.notes, *notes_on_features(team)))
 
 
 def _ending(team: Team, name: str) -> str:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.formats.names import MAX_NAME, RESERVED, is_name
 from robochoc.model.problem import Team
+from robochoc.model.uncertainty import is_uncertain
 from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.plain_text import counted
 
@@ -178,12 +179,12 @@ def notes_on_names(changed: Collection[tuple[str, str]]) -> list[ConversionNote]
     return [ConversionNote("renamed", f"{original} is {name}") for name, original in changed]
 
 
-def notes_on_absence(team: Team) -> list[ConversionNote]:
-    """Return a note on `when_absent` of constraints, which no other format supports; empty if it is not used."""
+def notes_on_features(team: Team) -> list[ConversionNote]:
+    """Return notes on features of `team` that no exported format supports: `when_absent`, and random variables."""
+    random = [ConversionNote("random", "costs are expected costs, without random variables")]
+    found = random if is_uncertain(team) else []
     first, *more = [*dict.fromkeys(one.name for one in team.constraints() if one.when_absent is not None), ""]
     others = f" and {counted(len(more) - 1, 'other constraint')}" if len(more) > 1 else ""
-    return (
-        [ConversionNote("left out", f"when_absent of {first}{others}: the format has no absent robots")]
-        if first
-        else []
-    )
+    if first:
+        found.append(ConversionNote("left out", f"when_absent of {first}{others}: the format has no absent robots"))
+    return found

@@ -105,7 +105,7 @@ def merge(instances: Sequence[Instance]) -> Instance:
     Raises:
         InvalidInputError: if the files do not belong together, or a file is missing.
     """
-    result = replace(instances[0], self_agent="", agents=[], variables={}, constraints=[], notes=[])
+    result = replace(instances[0], self_agent="", agents=[], variables={}, random={}, constraints=[], notes=[])
     if len(instances) > 1:
         _check_members(instances)
     _check_complete(instances)
@@ -114,6 +114,10 @@ def merge(instances: Sequence[Instance]) -> Instance:
         result.agents += [name for name in one.agents if name not in result.agents]
         result.notes += [note for note in one.notes if note not in result.notes]
         _add_variables(result, one)
+        for name, law in one.laws.items():
+            if result.laws.setdefault(name, law) != law:
+                what = f"the random variable '{shortened(name)}' has other probabilities in another file"
+                refuse(one.file, one.random[name].line, what, "write the same probabilities in all files")
         for constraint in one.constraints:
             if len(instances) == 1:
                 result.constraints.append(constraint)
@@ -172,8 +176,9 @@ def _check_complete(instances: Sequence[Instance]) -> None:
 
 
 def _add_variables(result: Instance, one: Instance) -> None:
-    for variable in one.variables.values():
-        first = result.variables.setdefault(variable.name, variable)
+    for variable in (*one.variables.values(), *one.random.values()):
+        known = result.random if variable.name in one.random else result.variables
+        first = known.setdefault(variable.name, variable)
         if (first.ranges, first.owner) != (variable.ranges, variable.owner):
             what = f"the variable '{shortened(variable.name)}' has a different domain or agent in another file"
             refuse(one.file, variable.line, what, "write the same domain and agent in all files")

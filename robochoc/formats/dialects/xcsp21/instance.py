@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import field
 from decimal import Decimal
+from fractions import Fraction
 from pathlib import Path
 from typing import NoReturn
 
@@ -87,6 +88,8 @@ class Instance:
         agents: The agents, the highest first.
         self_agent: The agent whose file this is, if each agent has its own file.
         variables: The variables, by their names.
+        random: The random variables, by their names. They have no owner.
+        laws: The probabilities of the random variables.
         constraints: The constraints.
         constant: The constant added to the cost.
         maximal_cost: Costs of at least this are infinite. None: no finite cost is.
@@ -102,6 +105,8 @@ class Instance:
     agents: list[str] = field(default_factory=list)
     self_agent: str = ""
     variables: dict[str, ForeignVariable] = field(default_factory=dict)
+    random: dict[str, ForeignVariable] = field(default_factory=dict)
+    laws: dict[str, Mapping[int, Fraction]] = field(default_factory=dict)
     constraints: list[ForeignConstraint] = field(default_factory=list)
     constant: Decimal = Decimal(0)
     maximal_cost: Decimal | None = None

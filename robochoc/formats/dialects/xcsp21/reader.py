@@ -5,12 +5,12 @@ The file is read through views of its elements: an unread part is an error.
 
 from __future__ import annotations
 
+import itertools
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from decimal import Decimal
 from pathlib import Path
-from typing import NoReturn
 
 from robochoc.formats.definitions import PREDEFINED
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
@@ -25,6 +25,7 @@ from robochoc.formats.dialects.xcsp21.instance import (
     Formula,
     Instance,
     Price,
+    refuse,
 )
 from robochoc.formats.dialects.xcsp21.numbers import (
     CostReader,
@@ -35,6 +36,7 @@ from robochoc.formats.dialects.xcsp21.numbers import (
     split_tuples,
     unit_places,
 )
+from robochoc.formats.dialects.xcsp21.probabilities import ProbabilityTable
 from robochoc.formats.element_view import ElementView, open_xml
 from robochoc.model.constraint import INFINITE, Function, Predicate
 from robochoc.model.expression import Expression, ExpressionError, Type, parse
@@ -121,14 +123,13 @@ class _Xcsp21Reader:
         self._relations: dict[str, ForeignTable | AsymmetricTable] = {}
         self._formulas: dict[str, Predicate | Function] = {}
         self._unit_places = 0
+        self._probabilities: dict[str, ProbabilityTable] = {}
 
     def read(self) -> None:
         """Fill `instance`. Raises `MistakeError`."""
         if self._root.tag != "instance":
             raise self._root.mistake(f"the root element is <{self._root.tag}>", "expected <instance>")
         self._root.ignore("GuiPresentation")
-        for element in self._elements("probabilities", "probability"):
-            self._not_stochastic(element)
         self._read_presentation()
         for element in self._elements("agents", "agent"):
             self._read_agent(element)
@@ -139,9 +140,16 @@ class _Xcsp21Reader:
         for element in self._elements("variables", "variable"):
             self._read_variable(element)
         self._read_definitions()
+        for element in self._elements("probabilities", "probability"):
+            with _with_line(element):
+                self._probabilities[self._new_name(element)] = ProbabilityTable(element)
         for element in self._elements("constraints", "constraint"):
             with _with_line(element):
                 self._read_constraint(element)
+        for name, variable in self.instance.random.items():
+            if name not in self.instance.laws:
+                hint = "add a constraint on it that refers to a probability"
+                refuse(self._path, variable.line, f"the random variable '{shortened(name)}' has no probabilities", hint)
 
     def _read_presentation(self) -> None:
         for presentation in self._root.children("presentation"):
@@ -188,20 +196,14 @@ class _Xcsp21Reader:
     def _read_variable(self, element: ElementView) -> None:
         name, domain = element.attribute("name"), element.attribute("domain")
         element.ignore_attributes("description", "id")
-        if element.attribute("type") == "random":
-            self._not_stochastic(element)
-        if name in self.instance.variables or not name:
+        known = self.instance.random if element.attribute("type") == "random" else self.instance.variables
+        if name in {*self.instance.variables, *self.instance.random} or not name:
             raise element.mistake(f"duplicate or empty variable name '{shortened(name)}'", "write a unique name")
         if domain not in self._domains:
             hint = suggestion(domain, self._domains, "domains")
             raise element.mistake(f"there is no domain '{shortened(domain)}'", hint)
         owner = element.attribute("agent") or element.attribute("owner")
-        self.instance.variables[name] = ForeignVariable(name, domain, self._domains[domain], owner, element.line)
-
-    def _not_stochastic(self, element: ElementView) -> NoReturn:
-        kind = "random variable" if element.tag == "variable" else "probability"
-        what = f"the {kind} '{shortened(element.attribute('name'))}': stochastic problems are not supported"
-        raise element.mistake(what, "give the variable one value")
+        known[name] = ForeignVariable(name, domain, self._domains[domain], owner, element.line)
 
     def _read_definitions(self) -> None:
         costs = CostReader(
@@ -223,16 +225,19 @@ class _Xcsp21Reader:
 
     def _new_name(self, element: ElementView) -> str:
         name = element.attribute("name")
-        if name in self._relations or name in self._formulas:
+        if name in self._relations or name in self._formulas or name in self._probabilities:
             raise MistakeError(f"duplicate definition '{shortened(name)}'", "rename one of them")
         return name
 
     def _read_constraint(self, element: ElementView) -> None:
         name, scope = element.attribute("name"), tuple(element.attribute("scope").split())
         element.ignore_attributes("arity")
+        if (law := self._probabilities.get(element.attribute("reference"))) is not None:
+            self._read_law(law, name, scope)
+            return
         for variable in scope:
-            if variable not in self.instance.variables:
-                hint = suggestion(variable, self.instance.variables, "variables")
+            if variable not in self._names:
+                hint = suggestion(variable, self._names, "variables")
                 raise MistakeError(f"there is no variable '{shortened(variable)}'", hint)
         for content in self._contents(element, scope):
             if isinstance(content, Formula):
@@ -243,10 +248,28 @@ class _Xcsp21Reader:
                 raise MistakeError(f"the constraint {shortened(name)} has no variables", "delete it")
             if len(self.instance.constraints) == MAX_CONSTRAINTS:
                 raise MistakeError(f"there are more than {MAX_CONSTRAINTS} constraints", "import a smaller problem")
+            if self.instance.random.keys() >= set(scope_now):
+                message = f"the constraint '{shortened(name)}' is over random variables only"
+                raise MistakeError(message, "use one constraint with probabilities for each random variable")
             private_agent = self._private_agent(element, self.instance)
             self.instance.constraints.append(
                 ForeignConstraint(name, scope_now, content, private_agent, str(self._path), element.line)
             )
+
+    def _read_law(self, table: ProbabilityTable, name: str, scope: tuple[str, ...]) -> None:
+        """Read a constraint that gives a random variable its probabilities."""
+        if len(scope) != 1 or scope[0] not in self.instance.random:
+            message = f"the probabilities of '{shortened(name)}' are not those of one random variable"
+            raise MistakeError(message, "write a scope of one random variable: joint probabilities are not supported")
+        if scope[0] in self.instance.laws:
+            raise MistakeError(f"'{shortened(scope[0])}' has probabilities already", "delete one constraint")
+        domain = self.instance.random[scope[0]].ranges
+        self.instance.laws[scope[0]] = table.law(itertools.chain.from_iterable(domain), scope[0])
+
+    @property
+    def _names(self) -> Mapping[str, ForeignVariable]:
+        """The variables, including random variables."""
+        return self.instance.variables | self.instance.random
 
     def _contents(self, element: ElementView, scope: tuple[str, ...]) -> list[ForeignTable | AsymmetricTable | Formula]:
         reference = element.attribute("reference")
@@ -283,8 +306,8 @@ class _Xcsp21Reader:
 
     def _check_terms(self, terms: tuple[str | int, ...]) -> None:
         for term in terms:
-            if isinstance(term, str) and term not in self.instance.variables:
-                hint = suggestion(term, self.instance.variables, "variables")
+            if isinstance(term, str) and term not in self._names:
+                hint = suggestion(term, self._names, "variables")
                 raise MistakeError(f"'{shortened(term)}' is not a variable", hint)
 
     def _elements(self, section: str, tag: str) -> Iterator[ElementView]:

@@ -21,6 +21,7 @@ from robochoc.formats.dialects.xcsp21.instance import (
     Price,
     refuse,
 )
+from robochoc.formats.dialects.xcsp21.probabilities import places_left, random_variables
 from robochoc.model.assembly import Extras, assemble
 from robochoc.model.constraint import (
     INFINITE,
@@ -35,7 +36,7 @@ from robochoc.model.constraint import (
     Variable,
 )
 from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
-from robochoc.model.problem import ProblemKind
+from robochoc.model.problem import ProblemKind, RandomVariable
 
 
 def to_team(instance: Instance, dialect: str, options: ImportOptions) -> ImportResult:
@@ -84,7 +85,7 @@ class _TeamBuilder:
             constraints,
             kind=ProblemKind.DISWCSP if is_weighted else ProblemKind.DISCSP,
             costs=self._units() if is_weighted else PLAIN_COSTS,
-            extras=Extras(parts=parts),
+            extras=Extras(parts=parts, random=self._random_variables()),
         )
         changed = self._names.originals
         notes = (*notes_on_names([*changed.items()]), *self._notes)
@@ -125,6 +126,19 @@ class _TeamBuilder:
             refuse(self._instance.file, variable.line, f"the domain of '{shortened(name)}' is empty", "add a value")
         return Variable(self._names.allowed(name), Domain(without_blanks(variable.domain), variable.ranges))
 
+    def _random_variables(self) -> list[RandomVariable]:
+        instance = self._instance
+        together = max((len(instance.random.keys() & set(one.scope)) for one in instance.constraints), default=0)
+        most = places_left(self._places, together)
+        if instance.random and not most:
+            message = f"a constraint has {together} random variables, and costs {self._places} decimal places"
+            refuse(instance.file, 0, message, "use fewer of them: expected costs have at most nine decimal places")
+        laws = {self._names.allowed(name): law for name, law in instance.laws.items()}
+        found, is_rounded = random_variables(laws, most)
+        if is_rounded:
+            self._notes.append(ConversionNote("rounded", f"probabilities are rounded to {most} decimal places"))
+        return found
+
     # Costs
 
     def _is_weighted(self) -> bool:
@@ -153,7 +167,7 @@ class _TeamBuilder:
         yield self._private_agent(one), self._constraint(one, one.content)
 
     def _asymmetric_parts(self, one: ForeignConstraint, sides: AsymmetricTable) -> Iterator[tuple[str, Constraint]]:
-        if len(one.scope) != 2:  # noqa: PLR2004 - a cost for each of two variables
+        if len(one.scope) != 2 or any(name in self._instance.random for name in one.scope):  # noqa: PLR2004 - a cost for each of two variables
             message = f"'{shortened(one.name)}' has two costs for each tuple, but {len(one.scope)} variables"
             refuse(one.file, one.line, message, "use asymmetric costs only for constraints on two variables")
         for variable, table in zip(one.scope, (sides.first, sides.second), strict=True):
@@ -162,7 +176,7 @@ class _TeamBuilder:
 
     def _private_agent(self, one: ForeignConstraint) -> str:
         """Return the only robot that knows a constraint with another robot, or an empty text."""
-        owners = {self._owner[name] for name in one.scope}
+        owners = {self._owner[name] for name in one.scope if name in self._owner}
         if not one.private_agent:
             return ""
         if one.private_agent not in owners:
@@ -170,7 +184,8 @@ class _TeamBuilder:
             refuse(one.file, one.line, f"{what} none of its variables", "name an agent that owns one of them")
         if len(owners) == 1:
             return ""
-        if len(one.scope) > 2 or _is_function(one):  # noqa: PLR2004 - partially known constraints are binary
+        is_random = any(name in self._instance.random for name in one.scope)
+        if len(one.scope) > 2 or is_random or _is_function(one):  # noqa: PLR2004 - partially known constraints are binary
             text = f"{one.name} is known only to {one.private_agent} in the file; now all robots of its scope know it"
             self._notes.append(ConversionNote("known to more", text))
             return ""
@@ -235,8 +250,8 @@ def _constrained_agents(instance: Instance, owner: Mapping[str, str]) -> Mapping
     seen: dict[str, set[str]] = defaultdict(set)
     for one in instance.constraints:
         for name in one.scope:
-            if not owner[name]:
-                seen[name] |= {owner[other] for other in one.scope} | {one.private_agent}
+            if owner.get(name) == "":
+                seen[name] |= {owner.get(other, "") for other in one.scope} | {one.private_agent}
     return seen
 
 

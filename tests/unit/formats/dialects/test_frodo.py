@@ -188,14 +188,19 @@ def test_one_file_an_agent_counts_copies_once(tmp_path: Path) -> None:
         read_foreign(files, ImportOptions())
 
 
+LAW = '<probabilities><probability name="q" semantics="soft" arity="1">{}</probability></probabilities>'
+OF_Q = '<constraints><constraint name="z" scope="xa" reference="q"/></constraints></instance>'
 RANDOM = '<variable name="w" domain="d" type="random"/></variables>'
 
 
 @looped(
     ("old", "new", "message"),
     [
-        ("</variables>", RANDOM, "the random variable 'w': stochastic problems are not supported"),
-        ("<relations>", '<probabilities><probability name="q"/></probabilities><relations>', "the probability 'q'"),
+        ("</variables>", RANDOM, "the random variable 'w' has no probabilities (add a constraint on it"),
+        ("</relations>", f"</relations>{LAW.format('2: 1')}", "'2' is not a probability"),
+        ("</relations>", f"</relations>{LAW.format('nan: 1')}", "'nan' is not a probability"),
+        ("</relations>", f"</relations>{LAW.format('0.5: 1 2')}", "'1 2' is not an outcome"),
+        ("</instance>", LAW.format("1: 1") + OF_Q, "are not those of one random variable"),
         ("1..3<", "1.5 2<", "the value 1.5 is not an integer (scale the values to integers)"),
         ("1..3<", "-infinity..3<", "'-infinity..3' is not an integer"),
         ("1..3<", "1..999999999<", "the domain has more than 100000 values"),
