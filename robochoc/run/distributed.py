@@ -36,11 +36,13 @@ FOUND_NOTHING = "ended, and found no assignment that satisfies all hard constrai
 class Deployment(ABC):
     """A team of robots that searches on command, on this machine or on several.
 
-    `options` are the options of the run, `searches` the number of searches in the last stage.
+    `options` are the options of the run, `searches` the number of searches in the last stage. `messages_before` is the
+    number of messages under earlier masters, which count for the limit.
     """
 
     options: Options
     searches: int = 1
+    messages_before: int = 0
 
     @property
     def compile_s(self) -> float:
@@ -190,7 +192,8 @@ class Deployment(ABC):
         if stop_requested():
             return STOPPED
         if self.left_s() != 0:
-            if options.messages is not None and sum(spent.messages.values()) >= options.messages:
+            messages = self.messages_before + sum(spent.messages.values())
+            if options.messages is not None and messages >= options.messages:
                 return f"{COUNTED_LIMIT} messages was reached (--messages {options.messages})"
             if options.ncccs is not None and spent.ncccs >= options.ncccs:
                 return f"{COUNTED_LIMIT} non-concurrent constraint checks was reached (--ncccs {options.ncccs})"

@@ -69,6 +69,15 @@ def test_lost_frames_lead_to_no_two_decisions(tmp_path: Path) -> None:
     assert found_in(SEEDS, "lost frames of masters", tmp_path, loss=0.01) == {}
 
 
+@pytest.mark.parametrize("limits", [{"timeout": 10.0}, {"messages": 500}])
+def test_limits_include_what_was_spent_under_earlier_masters(limits: dict[str, float], tmp_path: Path) -> None:
+    with virtual_world(TEAM, 0, tmp_path) as world:
+        world.changed = {**limits, "settings": {"cycles": "1000000"}}
+        world.play((MasterFault(9.0, "kill", MASTER, 0),))
+    spent = world.published["B"].metrics
+    assert (sum(spent.messages.values()) < 400) if "messages" in limits else (spent.wall_s < 5)
+
+
 def stopped_at(moment: str, folder: Path, seed: int, *planted: tuple[type, str, object]) -> World:
     """Play a run whose first master is stopped when it calls `moment`, until another one has decided."""
     called: Callable[..., object] = getattr(MasterVotes, moment)

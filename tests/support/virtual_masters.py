@@ -12,6 +12,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
 from queue import Empty
 from random import Random
@@ -293,6 +294,8 @@ class World:
         self.published: dict[str, Outcome] = {}
         self.endings: dict[str, Ending] = {}
         self.reasons: dict[str, str] = {}
+        self.changed: dict[str, Any] = {}
+        """Changes of the masters' plans."""
         self._loss = loss
         self._folder = folder
         self._events: list[tuple[float, float, int, Callable[[], None]]] = []
@@ -361,7 +364,7 @@ class World:
             conditions=NetworkSettings(patience_s=PATIENCE_S, survive=self._seed % 2 == 0),
         )
         try:
-            self.published[name] = run_master(plan).outcome
+            self.published[name] = run_master(replace(plan, **self.changed)).outcome
         except RobochocError as error:
             self.reasons[name] = str(error)
 

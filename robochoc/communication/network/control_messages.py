@@ -56,6 +56,13 @@ class TeamDecision(NamedTuple):
     words: str
 
 
+class Spent(NamedTuple):
+    """The messages sent and the seconds spent in a search so far, also under earlier masters."""
+
+    messages: Annotated[int, msgspec.Meta(ge=0)] = 0
+    seconds: Annotated[float, msgspec.Meta(ge=0)] = 0.0
+
+
 class AcceptedDecision(NamedTuple):
     """A decision, and the latest term in which a robot has accepted it. See `leadership.Acceptance`."""
 
@@ -357,6 +364,7 @@ class StandbyAnswer(_Message, frozen=True):
         failed: True if the run is over, and was not completed.
         resigned: True if this master does not lead any more, so that another one may.
         closed: True if the team is complete, so that its robots look for another master if this one is gone.
+        spent: The messages and the time of the search so far, which count for the limits of a later master.
     """
 
     names: dict[str, tuple[str, ...]]
@@ -365,6 +373,7 @@ class StandbyAnswer(_Message, frozen=True):
     failed: bool = False
     resigned: bool = False
     closed: bool = False
+    spent: Spent = Spent()
 
 
 # From robot to robot

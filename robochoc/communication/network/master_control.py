@@ -30,6 +30,7 @@ from robochoc.communication.network.control_messages import (
     Promised,
     Register,
     Revoked,
+    Spent,
     StandbyRequest,
     Standing,
     ToRobot,
@@ -111,13 +112,17 @@ class MasterControl(MasterLoop):
         self._facilitator = DirectoryFacilitator(endpoint, settings.protocol)
         self._requests = RequestHandler(self._journal_server, self._facilitator, self._send, self.events.refuse)
         self.votes = MasterVotes(self.run, identity.name)
-        self._standbys = Standbys(admission, connection.send)
+        self._standbys = Standbys(admission, connection.send, lambda: self.spent)
         self._heartbeat_at = self._listens_since = 0.0
         self._registrar = Registrar(members, connection, self._facilitator, self.events, settings, watched, self.votes)
         self.is_superseded: Callable[[], bool] = bool
         """Returns whether a master with a higher priority leads, so that this one must not close a team."""
         self.takes_over = False
         """True if another master has closed a team, whose robots look for a master."""
+        self.spent_before = Spent()
+        """The effort of the search under earlier masters."""
+        self.limited_since: float | None = None
+        """The time from which time limits count, on the monotonic clock; None: there was no search."""
         self._dead: dict[str, str] = {}
         self._has_ended = False
         self.absent: dict[str, str] = {}
@@ -125,6 +130,14 @@ class MasterControl(MasterLoop):
         self.snapshots: CheckedSnapshots | None = None
         """The snapshots in the current search, if robots must check them."""
         self._frame_loss = LossTracker(members, self.events.refuse, self._lose)
+
+    @property
+    def spent(self) -> Spent:
+        """The effort of the search so far, also under earlier masters."""
+        if self.limited_since is None:
+            return self.spent_before
+        messages = self.spent_before.messages + self.state.counters.sent
+        return Spent(messages, time.monotonic() - self.limited_since)
 
     def __enter__(self) -> Self:
         """Listen. Raises `RouterError` and `CannotConnectError`."""

@@ -8,22 +8,25 @@ import msgspec
 
 from robochoc.authority.admission import Admission
 from robochoc.authority.registry import Right, Role
-from robochoc.communication.network.control_messages import StandbyAnswer, StandbyRequest
+from robochoc.communication.network.control_messages import Spent, StandbyAnswer, StandbyRequest
 
 
 class Standbys:
-    """Answers the standby masters that follow this master. `send` sends an answer.
+    """Answers the standby masters that follow this master. `send` sends an answer, `spent` returns a search's effort.
 
     Attributes:
         waiting: The standby masters that do not know yet that the run is over.
         closed: True if the team of this master is complete.
     """
 
-    def __init__(self, admission: Admission, send: Callable[[str, StandbyAnswer], None]) -> None:
+    def __init__(
+        self, admission: Admission, send: Callable[[str, StandbyAnswer], None], spent: Callable[[], Spent] = Spent
+    ) -> None:
         self.waiting: set[str] = set()
         self.closed = False
         self._admission = admission
         self._send = send
+        self._spent = spent
         self._end = ("", False)
         self._has_resigned = False
 
@@ -53,7 +56,7 @@ class Standbys:
     def _answer(self) -> StandbyAnswer:
         names = {str(role): self._named(role) for role in Role}
         sniffers = self._admission.names(right=Right.SNIFF)
-        return StandbyAnswer(names, sniffers, *self._end, closed=self.closed)
+        return StandbyAnswer(names, sniffers, *self._end, closed=self.closed, spent=self._spent())
 
     def _named(self, role: Role) -> tuple[str, ...]:
         names = self._admission.names(role, invited=True)

@@ -64,15 +64,17 @@ class Machines(Deployment):
         self._name = name
         self._observer = observer
         self._audience = audience
-        self._begin_time()
+        spent = master.spent_before
+        self.messages_before = spent.messages
+        self._begin_time(spent.seconds if options.deadline is None else 0.0)  # as after a loss, a deadline is new
         self._lost: dict[str, str] = {}
         self._gone: list[Robot] = []
         self._values: Mapping[str, dict[str, int]] = {}
         self._improvements: Improvements | None = None
         self._snapshot = self._kept = NO_SNAPSHOT
 
-    def _begin_time(self) -> None:
-        self._began = time.monotonic()
+    def _begin_time(self, spent_s: float = 0.0) -> None:
+        self._began = self._master.limited_since = time.monotonic() - spent_s
         self._deadline = None if self.options.limit_s is None else self._began + self.options.limit_s
 
     @property
@@ -131,9 +133,9 @@ class Machines(Deployment):
             )
         left_s, checked = self.left_s(), self.options.deadline is not None
         self._master.watch = self._improvements = self._watch(phase) if checked else None
-        result = self._master.search(
-            phase.name, phase.traits, phase.parameters, left_s, self.options.messages, checked=checked
-        )
+        messages = self.options.messages
+        left = None if messages is None else max(0, messages - self.messages_before)
+        result = self._master.search(phase.name, phase.traits, phase.parameters, left_s, left, checked=checked)
         if not result.lost:
             self._refuse_contradictions()
         return Search(result, partial(self._check, phase, result), self._nearest)

@@ -233,6 +233,7 @@ def _stand_by(
             master = opened(watch.admission, standby.identity)
             master.is_superseded = lambda: watch.is_led
             master.takes_over = watch.has_closed
+            master.spent_before = watch.spent
             with master:
                 listening()
                 try:

@@ -18,7 +18,7 @@ import msgspec
 
 from robochoc.authority.identity import Identity
 from robochoc.authority.registry import PRIVATE
-from robochoc.communication.network.control_messages import StandbyAnswer, StandbyRequest
+from robochoc.communication.network.control_messages import Spent, StandbyAnswer, StandbyRequest
 from robochoc.communication.network.framing import MASTER, FrameRefusedError, Framing
 from robochoc.communication.network.inbox import FrameArrived
 from robochoc.communication.network.masters import SILENCE_S, listens
@@ -168,6 +168,11 @@ class LeaderWatch:
     def has_closed(self) -> bool:
         """True if the team was complete at the last answer of a leading master."""
         return self._answer is not None and self._answer.closed
+
+    @property
+    def spent(self) -> Spent:
+        """The effort of the search under earlier masters, as in the last answer of a leading master."""
+        return self._answer.spent if self._answer else Spent()
 
     @property
     def admission(self) -> CopiedAdmission:
