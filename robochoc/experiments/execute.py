@@ -91,7 +91,8 @@ class TaskRunner(AbstractContextManager["TaskRunner"]):
         _fill(row, outcome, team)
         row.cost_over_time = curve.points() if curve else []
         row.loads = loads.loads() if loads else []
-        row.assignment = dict(outcome.assignment) if ASSIGNMENT in task.record else {}
+        if ASSIGNMENT in task.record and outcome.events == len(team.scenario):
+            row.assignment = dict(outcome.assignment)
         row.journal = journal_bytes(journal, outcome) if journal else b""
 
     def _team(self, problem: ProblemSpec) -> tuple[Team, str]:
@@ -162,7 +163,8 @@ def _fill(row: Row, outcome: Outcome, team: Team) -> None:
         by_itself = any(why in (outcome.reason or "") for why in (GAVE_UP, FOUND_NOTHING))
         row.status = Status.ENDED if by_itself else Status.LIMIT
     row.reason, row.verdict = outcome.reason, str(outcome.verdict)
-    row.cost, row.bound = _exact(outcome.cost if team.kind == ProblemKind.DISWCSP else None), _exact(outcome.bound)
+    if outcome.events == len(team.scenario):  # otherwise a limit ended the run before the last problem
+        row.cost, row.bound = _exact(outcome.cost if team.kind == ProblemKind.DISWCSP else None), _exact(outcome.bound)
     row.withdrawn, row.verified, row.confirmed = len(outcome.withdrawn), outcome.verified, outcome.confirmed
     row.wall_s, row.compile_s, row.memory = metrics.wall_s, metrics.compile_s, metrics.memory or None
     if outcome.protocol == CENTRAL:  # the central solver sends no messages, so its counts are not comparable

@@ -10,7 +10,7 @@ import pytest
 
 from robochoc.experiments.digests import digest_of_files
 from robochoc.experiments.execute import TaskRunner, team_of
-from robochoc.experiments.task import Limits, ProblemSpec, Recording, Row, Setup, Status, Task, options_of
+from robochoc.experiments.task import ASSIGNMENT, Limits, ProblemSpec, Recording, Row, Setup, Status, Task, options_of
 from robochoc.formats.team_writer import write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import Improved, Sent
@@ -203,6 +203,23 @@ def test_problems_in_files_and_generated_ones_are_the_same_problem(bench: TaskRu
         )
     ]
     assert counts[0] == counts[1]
+
+
+def test_a_run_that_ends_before_the_last_problem_has_no_cost(bench: TaskRunner) -> None:
+    problem = msgspec.structs.replace(COSTS, scenario={"events": 1, "rate": 0.2, "seed": 1, "kinds": "add-constraint"})
+    setup = Setup(protocol="dsa", settings={"cycles": "10"})
+    limits = Limits(messages=20)
+    with_limit, without = (
+        bench.run(Task(problem=problem, setup=setup, limits=one, record=(ASSIGNMENT,))) for one in (limits, Limits())
+    )
+    assert (with_limit.status, with_limit.cost, with_limit.bound, with_limit.assignment) == (
+        Status.LIMIT,
+        None,
+        None,
+        {},
+    )
+    assert without.cost is not None
+    assert without.assignment
 
 
 def test_a_scenario_is_drawn(bench: TaskRunner) -> None:
