@@ -25,6 +25,7 @@ COMMANDS = {
     "compile": "compile {examples}/arm --no-cache",
     "solve": "solve {team} --withdraw maximal --html {out}/page.html --journal {out}/run.journal",
     "simulator": "solve {team} --withdraw --runtime simulator",
+    "standby": "solve {examples}/scouts --runtime network --standby 1 --protocol dsa --set cycles=1000000",
     "central": "solve {team} --protocol central --withdraw --timeout 20",
     "export": "export {team} -o {out}/problem.xml",
     "animate": "animate {saved} --team {team} -o {out}/page.html",
