@@ -63,7 +63,8 @@ def _open_standard_streams() -> None:
 class TerminationSignals:
     """The handler of SIGINT and SIGTERM: the first signal raises `KeyboardInterrupt` or `Terminated`.
 
-    The handler never raises during an import, since many modules print or suppress exceptions while they are loaded.
+    The handler never raises during an import, since many modules print or suppress exceptions while they are loaded, or
+    in `__set_name__`.
     """
 
     def __init__(self) -> None:
@@ -116,8 +117,9 @@ class TerminationSignals:
 
 
 def _importing(frame: FrameType | None) -> bool:
+    """Return whether a module is imported, or a class asks `__set_name__`, whose exceptions Python 3.11 replaces."""
     while frame is not None:
-        if frame.f_code.co_filename.startswith("<frozen importlib"):
+        if frame.f_code.co_filename.startswith("<frozen importlib") or frame.f_code.co_name == "__set_name__":
             return True
         frame = frame.f_back
     return False

@@ -178,18 +178,29 @@ def test_a_signal_before_the_program_has_begun(
         assert run.left_behind() == []
 
 
-def test_a_signal_that_python_swallows_is_raised_again(tmp_path: Path) -> None:
-    """Python drops what is raised within the callback of a weak reference, and prints it."""
-    program = """
+IN_A_CALLBACK = """
+thing = Thing()
+callback = weakref.ref(thing, lambda _: signal.raise_signal(signal.SIGINT))
+del thing
+"""
+IN_SET_NAME = """
+def __set_name__(self, owner, name):
+    signal.raise_signal(signal.SIGINT)
+Thing.__set_name__ = __set_name__
+type("Owner", (), {"thing": Thing()})
+"""
+
+
+@pytest.mark.parametrize("moment", [IN_A_CALLBACK, IN_SET_NAME])
+def test_a_signal_whose_exception_python_swallows_or_replaces_is_raised_later(moment: str, tmp_path: Path) -> None:
+    program = f"""
 import signal, sys, time, weakref
 from robochoc.cli.main import TerminationSignals
 
 class Thing: pass
 
 TerminationSignals().install()
-thing = Thing()
-callback = weakref.ref(thing, lambda _: signal.raise_signal(signal.SIGINT))
-del thing
+{moment}
 try:
     time.sleep(30)
 except KeyboardInterrupt:
