@@ -19,11 +19,12 @@ from robochoc.robots.sink import Fields
 from robochoc.ros.decide_service import DECIDE, refusal
 from robochoc.ros.interfaces import DECIDE_ACTION
 from robochoc.ros.live import dds_service, service_goals
-from robochoc.ros.live.action_goals import ActionGoals, CancelCode, GoalClients, GoalStatus
+from robochoc.ros.live.action_goals import ENDED_MAX, ActionGoals, CancelCode, GoalClients, GoalStatus
 from robochoc.ros.live.actions import Actions, GoalEvent, GoalPhase, open_actions
 from robochoc.ros.live.service_goals import ServiceGoals
 from robochoc.ros.live.services import ENDED, WAITING_MAX, ServiceRequest
 from tests.support.dds import LOOPBACK_ALONE, free_domain
+from tests.support.examples import drawn
 from tests.support.limits import HANG_S, wait_until
 from tests.support.program import ROOT
 from tests.support.rosbridge_server import Server, begin_the_loop_of_roslibpy
@@ -63,10 +64,10 @@ class Recorded(GoalClients):
 class Goals:
     """Goals with a queue of a given size."""
 
-    def __init__(self, room: int = WAITING_MAX) -> None:
+    def __init__(self, room: int = WAITING_MAX, refuse: Callable[[str], Fields] = refusal) -> None:
         self.queue: list[ServiceRequest] = []
         self.cancelled = 0
-        self.goals = ActionGoals("goal", self._cancel, refusal)
+        self.goals = ActionGoals("goal", self._cancel, refuse)
         self.goals.set_queue(self._put)
         self.room = room
         self.clients = self.goals.clients = Recorded()
@@ -135,6 +136,58 @@ def test_goals_before_the_queue_is_there_wait() -> None:
     assert goals.accept("a", {})
     goals.set_queue(lambda request: queue.append(request) is None)  # type: ignore[func-returns-value]
     assert [one.client for one in queue] == ["a"]
+
+
+@pytest.mark.parametrize("number", range(5))
+def test_whatever_clients_do_each_goal_has_one_result(number: int) -> None:
+    chance = drawn(f"goals {number}")
+    played = Goals(room=chance.randint(1, 20))
+    accepted: list[str] = []
+    for _ in range(300):
+        names = [f"{chance.randrange(250)}" for _ in range(2)]
+        match chance.randrange(6):
+            case 0 | 1:
+                accepted += names[:1] * played.goals.accept(names[0], {"team": chance.choice((1, "", None))})
+            case 2:
+                code = played.goals.cancel(chance.choice([*played.goals.open_goals(), *names]))
+                assert code in set(CancelCode)
+            case 3 if played.queue:
+                request = played.queue.pop(0)
+                if played.goals.begin(request.client):
+                    played.goals.feedback({})
+            case 4:
+                played.goals.finish({"success": chance.random() < 0.5, "message": ""})
+            case _:
+                played.goals.feedback({})
+        assert len(played.goals.open_goals()) <= WAITING_MAX
+    played.goals.close()
+    played.goals.finish({"success": True, "message": "too late"})
+    assert sorted(goal for goal, *_ in played.clients.results) == sorted(accepted)
+
+
+def test_a_second_cancellation_of_a_waiting_goal_does_not_cancel_the_current_one() -> None:
+    again: list[CancelCode] = []
+
+    def refuse(why: str) -> Fields:
+        again.append(played.goals.cancel("b"))
+        return refusal(why)
+
+    played = Goals(refuse=refuse)
+    for name in "ab":
+        played.goals.accept(name, {})
+    assert played.goals.begin("a")
+    assert played.goals.cancel("b") is CancelCode.NONE
+    assert (again, played.cancelled) == ([CancelCode.NONE], 0)
+
+
+def test_results_that_nobody_requests_are_forgotten() -> None:
+    played = Goals(room=10_000)
+    clients = played.goals.clients = ServiceGoals(ACTION, DECIDE, played.goals)
+    for number in range(150):
+        goal = f"{number:032x}"
+        assert played.goals.accept(goal, {})
+        played.goals.cancel(goal)
+    assert len(vars(clients)["_owed"]) <= ENDED_MAX + 1
 
 
 def test_services_of_an_action() -> None:

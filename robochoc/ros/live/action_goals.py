@@ -121,10 +121,11 @@ class ActionGoals:
                 return CancelCode.ENDED_GOAL
             is_waiting = found.status is GoalStatus.ACCEPTED
             found.status = GoalStatus.CANCELING
+            if goal == self._current:  # while the lock is held, no other goal begins
+                self._cancel()
         if is_waiting:
             self._end(goal, GoalStatus.CANCELED, self._refuse("cancelled before its decision began"))
         else:
-            self._cancel()
             self._publish()
         return CancelCode.NONE
 
@@ -162,11 +163,9 @@ class ActionGoals:
 
     def finish(self, answer: Fields) -> None:
         """End the current goal with its result."""
-        goal, self._current = self._current, ""
-        if goal not in self.open_goals():
-            return
         with self._lock:
-            is_cancelled = self._goals[goal].status is GoalStatus.CANCELING
+            goal, self._current = self._current, ""
+            is_cancelled = goal in self._goals and self._goals[goal].status is GoalStatus.CANCELING
         failed = GoalStatus.CANCELED if is_cancelled else GoalStatus.ABORTED
         self._end(goal, GoalStatus.SUCCEEDED if answer.get("success") else failed, answer)
 
@@ -177,7 +176,9 @@ class ActionGoals:
 
     def _end(self, goal: str, status: GoalStatus, result: Fields) -> None:
         with self._lock:
-            found = self._goals[goal]
+            found = self._goals.get(goal)
+            if found is None or found.is_ended:  # another thread has ended it
+                return
             found.status, found.result = status, result
             ended = [name for name, one in self._goals.items() if one.is_ended]
             for name in ended[:-ENDED_MAX]:

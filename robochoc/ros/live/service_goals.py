@@ -50,7 +50,9 @@ class ServiceGoals(GoalClients):
         self._offered = offered
 
     def status(self, goals: Mapping[str, tuple[GoalStatus, int]]) -> None:
-        """Publish the statuses."""
+        """Publish the statuses. Results that are no longer stored cannot be requested."""
+        with self._lock:
+            self._owed &= goals.keys()
         listed = [{"goal_info": _info(goal, at_ns), "status": int(status)} for goal, (status, at_ns) in goals.items()]
         self._publish(1, {"status_list": listed})
 
