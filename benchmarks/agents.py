@@ -23,6 +23,8 @@ from robochoc.seats import GameOptions, play
 GRAPHS = ("small-world", "scale-free", "delaunay")
 COMPLETE = ("abt", "abt-do-retro", "agile-abt", "awc", "afc-ng", "afc-tree")
 LOCAL = ("dsa", "dsa-sdp", "mgm", "mgm2", "gdba", "lamdls")
+MESSAGES = 300_000
+"""The limit of a run; `awc` exceeds it on some triangulations."""
 PLAYERS = ("random", "greedy", "dsa", "mgm", "optimal")
 
 
@@ -33,7 +35,7 @@ def protocols(task: str) -> Sequence[str]:
 
 def solved(team: Team, protocol: str, seed: int = 1) -> Outcome:
     """Return the outcome of a run in the simulator."""
-    return solve(team, Options(protocol=protocol, runtime=Runtime.SIMULATOR, seed=seed))
+    return solve(team, Options(protocol=protocol, runtime=Runtime.SIMULATOR, seed=seed, messages=MESSAGES))
 
 
 def runs_table(agents: int, seeds: int) -> None:

@@ -13,8 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robochoc.cli.reports.outcome import outcome_report
+from robochoc.model.change import apply_changes
 from robochoc.model.coalition import can_fill, coalitions
-from robochoc.run import Options, Runtime, solve
+from robochoc.model.problem import RemoveAgent
+from robochoc.run import Options, Runtime, Withdrawal, solve
+from robochoc.solver.errors import UnsupportedError
 from tests.support.random_task_lists import read_or_refused, written
 from tests.support.task_lists import imported, mistakes
 from tests.support.timed_task_lists import TimedMeaning, team_list
@@ -56,6 +59,33 @@ def test_random_lists_with_teams_have_the_optimum_of_all_coalitions(count: int, 
             sum(found.assignment.get(f"{one}.{task}", 0) for one in told["robots"]) > 1 for task in told["tasks"]
         )
     assert joint > count / 5
+
+
+@pytest.mark.usefixtures("shared_solvers")
+@pytest.mark.parametrize("count", [15, pytest.param(500, marks=pytest.mark.slow)])
+def test_if_a_robot_leaves_the_others_have_the_optimum_of_their_own_coalitions(count: int, tmp_path: Path) -> None:
+    """Withdrawals are refused: a robot that withdraws would lose its worth, which is a negative cost.
+
+    The rule that an earlier task must be done is dropped with the robot, so there are no orders here.
+    """
+    chance, solved = Random(f"losses {count}"), 0
+    while solved < count:
+        told = team_list(chance)
+        for task in told["tasks"].values():
+            task.pop("after", None)
+        path = tmp_path / "list.yaml"
+        path.write_text(written(told, "block"))
+        team, _ = read_or_refused(path)
+        if team is None or len(team.order) < 2:
+            continue
+        with pytest.raises(UnsupportedError, match="negative costs, or utilities; with --withdraw"):
+            solve(team, Options(protocol="sfb", runtime=Runtime.SIMULATOR, withdraw=Withdrawal.MINIMUM))
+        gone = chance.choice(team.order)
+        rest = {**told, "robots": {name: one for name, one in told["robots"].items() if name != gone}}
+        found = solve(apply_changes(team, [RemoveAgent(gone)]), _OPTIONS)
+        assert found.cost is not None
+        assert Fraction(found.cost) == TimedMeaning(rest).best(), (gone, path.read_text())
+        solved += 1
 
 
 @pytest.mark.usefixtures("shared_solvers")
