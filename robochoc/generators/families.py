@@ -22,6 +22,7 @@ from robochoc.generators import random_csp as random_problems
 from robochoc.generators import sensors as sensor_networks
 from robochoc.generators import smart_grid as grids
 from robochoc.generators import smart_homes as lightings
+from robochoc.generators import stochastic as stochastic_problems
 from robochoc.generators import tasks as allocations
 from robochoc.generators import tracking as trackings
 from robochoc.generators.graph_choice import GraphChoice
@@ -234,6 +235,7 @@ FAMILIES: Mapping[str, Callable[..., Team]] = MappingProxyType(
         "ising": isings.ising,
         "meetings": meetings,
         "nary": nary_problems.nary,
+        "stochastic": stochastic_problems.stochastic,
         "patrol": patrol,
         "queens3d": queens.queens3d,
         "random": random,

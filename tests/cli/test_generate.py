@@ -25,6 +25,7 @@ from robochoc.generators.nary import nary
 from robochoc.generators.random_csp import random_on
 from robochoc.generators.sensors import Reach, grid_sensors, sensors
 from robochoc.generators.smart_homes import smart_homes
+from robochoc.generators.stochastic import stochastic
 from robochoc.generators.tasks import Skills, Travel, tasks
 from robochoc.generators.tracking import tracking
 from robochoc.maps.occupancy.grid import read_occupancy_grid
@@ -57,6 +58,7 @@ FAMILIES: dict[str, Callable[[], Team]] = {
     "nary --agents 5 --domain 2 --constraints 4 --max-cost 9": lambda: nary(
         agents=5, domain=2, constraints=4, max_cost=9
     ),
+    "stochastic --agents 5 --domain 3 --observed 0.5": lambda: stochastic(agents=5, domain=3, observed=0.5),
     "frequencies --agents 5 --frequencies 3": lambda: frequencies(agents=5, frequencies=3),
     "smart-homes --agents 4 --rules 3 --levels 3": lambda: smart_homes(agents=4, rules=3, levels=3),
     "meetings --agents 3 --meetings 2 --slots 3 --max-length 2": lambda: meetings(3, 2, 2, 3, max_length=2),

@@ -27,6 +27,7 @@ EXAMPLES: dict[str, dict[str, int | float | str]] = {
     "sensors": {"sensors": 4, "targets": 1},
     "smart-grid": {"agents": 2},
     "smart-homes": {"agents": 3, "rules": 2},
+    "stochastic": {"agents": 3, "domain": 2},
     "tasks": {"agents": 2, "tasks": 2},
     "tracking": {"agents": 2, "targets": 1, "side": 3},
 }

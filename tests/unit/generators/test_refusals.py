@@ -22,6 +22,7 @@ from robochoc.generators.queens3d import MAX_N, QueensModel, queens3d
 from robochoc.generators.random_csp import random_csp, random_on
 from robochoc.generators.scenario import random_scenario
 from robochoc.generators.sensors import Reach, grid_sensors, sensors
+from robochoc.generators.stochastic import stochastic
 from robochoc.generators.tasks import Skills, Travel, tasks
 from robochoc.generators.tracking import tracking
 from robochoc.model.cost_units import CostUnits
@@ -94,6 +95,10 @@ def of_families() -> Rows:
         (lambda: ising(3, 3, coupling=-1), "coupling is -1"),
         (lambda: ising(3, 3, field=NAN), "field is nan"),
         (lambda: meetings(0, 3, 1, 3), "agents is 0"),
+        (lambda: stochastic(agents=3, domain=2, reach=4), "reach is 4; it must be from 1 to 3"),
+        (lambda: stochastic(agents=3, domain=2, outcomes=11), "outcomes is 11"),
+        (lambda: stochastic(agents=3, domain=2, observed=NAN), "observed is nan"),
+        (lambda: stochastic(agents=1, domain=2, random=9, outcomes=3, reach=1, observed=1), "more than 4,096 joint"),
         (lambda: meetings(3, 3, 4, 3), "participants is 4; it must be from 1 to 3"),
         (lambda: meetings(3, 3, 2, 0), "slots is 0"),
         (lambda: meetings(3, 3, 2, 3, max_length=4), "max-length is 4; it must be from 1 to 3"),

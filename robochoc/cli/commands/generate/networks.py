@@ -1,4 +1,4 @@
-"""`robochoc generate nary`, `frequencies`, `smart-homes` and `smart-grid`: links, lamps and devices of homes."""
+"""`robochoc generate nary`, `stochastic`, `frequencies`, `smart-homes`, `smart-grid`: links, lamps, and chance."""
 
 from __future__ import annotations
 
@@ -43,6 +43,31 @@ def nary(**problem: Any) -> Team:  # noqa: ANN401 - `nary`'s own
     from robochoc.generators.nary import nary as random_nary
 
     return random_nary(**problem)
+
+
+@click.command(short_help="Random variables: costs that depend on chance.")
+@number_option("--agents", "Number of robots.")
+@number_option("--domain", "Number of values of each variable.")
+@share_option("--density", "Fraction of pairs of robots that share costs", 0.4)
+@number_option("--random", "Number of random variables.", least=0, most=100, default=2)
+@number_option("--outcomes", "Number of outcomes of a random variable.", most=10, default=2)
+@number_option("--reach", "Number of robots whose costs depend on a random variable.", default=2)
+@share_option("--observed", "Probability that such a robot observes the outcome before it chooses", 0.0)
+@number_option("--max-cost", "Maximum cost.", least=0, most=MAX_COST, default=10)
+@seed_option
+@writes_team("stochastic-AGENTS-DOMAIN-DENSITY-RANDOMxOUTCOMES-REACH-OBSERVED-MAX-SEED")
+def stochastic(**problem: Any) -> Team:  # noqa: ANN401 - `stochastic`'s own
+    """Random problems whose costs depend on chance (StochDCOP; Leaute and Faltings 2011).
+
+    Robot3 has the variable V3; the random variables are r1, r2, ...
+
+    \b
+    robochoc generate stochastic --agents 6 --domain 3 --density 0.4
+    robochoc generate stochastic --agents 6 --domain 3 --density 0.4 --observed 0.5
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
+    from robochoc.generators.stochastic import stochastic as random_stochastic
+
+    return random_stochastic(**problem)
 
 
 @click.command(short_help="Frequency assignment: radio links with little interference.")
