@@ -30,6 +30,10 @@ def named_protocols(words: Sequence[str]) -> Iterator[list[str]]:
     Raises:
         UnknownProtocolError: if a word is not valid, a class cannot be used, or its name is that of another protocol.
     """
+    for word in words:
+        if word.endswith(".py") or os.sep in word:
+            example = f"{Path(word).stem}:CLASS"
+            raise UnknownProtocolError(f"{word} is a file: name its protocol as {example}, in the file's folder")
     installed = {entry.value: entry.name for entry, _ in all_entry_points(GROUP)}
     words = [installed.get(word, word) for word in words]
     places = _places([word for word in words if ":" in word])

@@ -23,7 +23,8 @@ PEER_NAMES = ("frodo", "pydcop", "propflow")
 """The names of peers, which are other tools."""
 PEER_SEPARATOR = ":"
 """It separates the name of a peer from its algorithm; names of protocols do not contain it."""
-Count = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
+LARGEST_COUNT = 2**53
+Count = Annotated[int, msgspec.Meta(ge=0, le=LARGEST_COUNT)]
 Cost = Annotated[int, msgspec.Meta(ge=-(2**53), le=2**53)]
 Name = Annotated[str, msgspec.Meta(max_length=200, pattern=r"^[A-Za-z0-9][A-Za-z0-9 .,_+:-]*\Z")]
 Place = Annotated[str, msgspec.Meta(max_length=400, pattern=r"^([\w.]+:[\w.]+)?\Z")]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 
 import msgspec
@@ -19,9 +19,11 @@ from robochoc.privacy import Measure, PrivacyError, privacy_of
 from robochoc.run.distributed import COUNTED_LIMIT
 from robochoc.run.options import ScheduleName
 from robochoc.run.registry import installed_protocol, installed_spelling, protocol_named
+from robochoc.system.plain_text import counted
 
 MEMORY_MB = 4096
 """The memory of a worker; a run that needs more fails."""
+_FAILED = {Status.LOST, Status.REFUTED, Status.MEMORY, Status.CRASHED, Status.ERROR}
 _DIGITS = 6
 """The decimal places of the privacy loss: its logarithms may differ between machines beyond them."""
 
@@ -127,6 +129,16 @@ def _privacy(journal: bytes) -> float | None:
 def met_time_limit(run: RunResult) -> bool:
     """Return whether the time limit ended a run, whose results then depend on the machine."""
     return run.status == Status.LIMIT and not (run.reason or "").startswith(COUNTED_LIMIT)
+
+
+def failures(results: LeaderboardResults) -> Iterator[str]:
+    """Yield a sentence for each entrant with runs that failed, which is not the fault of a limit or the problem."""
+    for one in results.entrants:
+        own = [run for run in results.runs if run.protocol == one.name]
+        failed = [run for run in own if run.status in _FAILED]
+        if failed:
+            first = f"first {failed[0].instance}: {failed[0].reason or failed[0].status}"
+            yield f"{one.name}: {len(failed):,} of {counted(len(own), 'run')} failed, {first}"
 
 
 def comparable(run: RunResult) -> RunResult:

@@ -94,6 +94,30 @@ def test_a_protocol_of_a_module_enters(tmp_path: Path, monkeypatch: pytest.Monke
     assert (other.returncode, "its files (robochoc_breakout 0) have changed" in other.stderr) == (0, True)
 
 
+BROKEN = """
+from robochoc.protocols import Message, Protocol, Traits
+
+class Broken(Protocol):
+    messages = Message
+    traits = Traits(paper="none", complete=False, costs=True)
+
+    def start(self):
+        undefined
+
+    def receive(self, sender, message):
+        pass
+"""
+
+
+def test_failed_runs_are_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "broken_module.py").write_text(BROKEN)
+    done = robochoc_within("leaderboard", "run", "broken_module:Broken", *TWO, "-o", tmp_path / "results.json")
+    assert done.stderr == (
+        "broken: 2 of 2 runs failed, first random-small-0: NameError: name 'undefined' is not defined\n"
+    )
+
+
 def test_names_without_modules_need_no_package() -> None:
     with named_protocols(["dpop", "robochoc.protocols.local_search.mgm:MGM"]) as names:
         assert names == ["dpop", "mgm"]
@@ -115,6 +139,7 @@ def test_wrong_usage() -> None:
                 ["run", "one:Mine", "other:Mine"],
                 "other:Mine would be called 'mine', as one:Mine already is: rename the class",
             ),
+            (["run", "mine/quick_pick.py"], "is a file: name its protocol as quick_pick:CLASS, in the file's folder"),
             (["run", "evil:"], "'evil:' is not of the form MODULE:CLASS"),
             (["run", "json:JSONDecoder"], "json:JSONDecoder is not a subclass of Protocol"),
             (["run", "dpop", "--budget", "hours=3"], "'hours=3' is not one of messages, ncccs, cycles, time"),

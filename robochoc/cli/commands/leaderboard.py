@@ -182,8 +182,9 @@ def run(  # noqa: PLR0913, PLR0917 - options
     from robochoc.cli.reports.progress import progress_line
     from robochoc.communication.search_result import Progress
     from robochoc.leaderboard.outside import named_protocols
+    from robochoc.leaderboard.peers.claims import wrong_claims_of_peers
     from robochoc.leaderboard.results import is_peer_name, write_results
-    from robochoc.leaderboard.running import entrants, run_leaderboard
+    from robochoc.leaderboard.running import entrants, failures, run_leaderboard
     from robochoc.system.posix import usable_processors
 
     chosen, budget = list(_instances(families, sizes, range(seeds))), _budget(budget_words)
@@ -202,11 +203,8 @@ def run(  # noqa: PLR0913, PLR0917 - options
 
             results = with_peers(results, entered, chosen, **common)
         write_results(results, output)
-    if entered:
-        from robochoc.leaderboard.peers.claims import wrong_claims_of_peers
-
-        for wrong in wrong_claims_of_peers(results.runs):
-            click.echo(on_one_line(wrong), err=True)
+    for line in (*failures(results), *wrong_claims_of_peers(results.runs)):
+        click.echo(on_one_line(line), err=True)
     click.echo(f"{output}: {counted(len(results.runs), 'run')}; next: robochoc leaderboard show {output}")
 
 

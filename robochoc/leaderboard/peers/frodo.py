@@ -76,7 +76,7 @@ class Frodo(Peer):
     def answer(self, folder: Path, ended: EndedProgram) -> PeerAnswer:
         """Return the solution in the file, with the counts in the output."""
         path = folder / "solution.xml"
-        if not path.exists():
+        if not path.is_file():
             raise PeerError(last_line(ended) or f"ended with status {ended.status}, and wrote no solution")
         try:
             found = parsed_tree(path.read_bytes(), path, LARGEST_FILE)

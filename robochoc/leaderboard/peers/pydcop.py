@@ -89,7 +89,7 @@ class Pydcop(Peer):
     def answer(self, folder: Path, ended: EndedProgram) -> PeerAnswer:
         """Return the answer in the file of results. Its message sizes are not bytes, so they are not reported."""
         path = folder / _RESULT
-        if not path.exists():
+        if not path.is_file():
             raise PeerError(last_line(ended) or f"ended with status {ended.status}, and wrote no result")
         try:
             found = msgspec.json.decode(path.read_bytes(), type=_Result)

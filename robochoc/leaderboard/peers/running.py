@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -21,7 +22,7 @@ from robochoc.leaderboard.peers.peer import Algorithm, Peer, PeerAnswer, PeerErr
 from robochoc.leaderboard.peers.program import run_program
 from robochoc.leaderboard.peers.propflow import Propflow
 from robochoc.leaderboard.peers.pydcop import Pydcop
-from robochoc.leaderboard.results import PEER_SEPARATOR, Budget, Entrant, LeaderboardResults, RunResult
+from robochoc.leaderboard.results import LARGEST_COUNT, PEER_SEPARATOR, Budget, Entrant, LeaderboardResults, RunResult
 from robochoc.model.constraint import ConstraintModel
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ProblemKind, Team
@@ -123,10 +124,16 @@ def with_peers(
 def _run(
     pair: tuple[Instance, PeerEntrant], _: Callable[[int], None], *, folder: Path, budget: Budget, times: bool
 ) -> RunResult:
-    instance, one = pair
-    blank = RunResult(instance=instance.name, protocol=one.entrant.name, status=Status.REFUSED)
-    own = folder / f"{instance.name}-{one.peer.name}-{'-'.join(one.algorithm.words).replace('/', '-')}"
+    own = folder / f"{pair[0].name}-{pair[1].entrant.name.replace(PEER_SEPARATOR, '-')}"
     own.mkdir()
+    try:
+        return _run_in(own, *pair, budget, times=times)
+    finally:
+        shutil.rmtree(own, ignore_errors=True)
+
+
+def _run_in(own: Path, instance: Instance, one: PeerEntrant, budget: Budget, *, times: bool) -> RunResult:
+    blank = RunResult(instance=instance.name, protocol=one.entrant.name, status=Status.REFUSED)
     team = checked_team(instance)
     try:
         _refuse(team)
@@ -170,9 +177,9 @@ def checked_run(blank: RunResult, team: Team, answer: PeerAnswer, algorithm: Alg
         status=Status.ENDED if has_ended else Status.LIMIT,
         reason=fault or None,
         verdict=Verdict.UNKNOWN,
-        messages=answer.messages,
-        bytes=answer.bytes,
-        ncccs=answer.ncccs,
+        messages=_valid_count(answer.messages),
+        bytes=_valid_count(answer.bytes),
+        ncccs=_valid_count(answer.ncccs),
         claimed_verdict=claimed,
         claimed_cost=claimed_cost,
     )
@@ -188,6 +195,10 @@ def checked_run(blank: RunResult, team: Team, answer: PeerAnswer, algorithm: Alg
     is_proof = claimed == Verdict.OPTIMAL and not wrong_claim(run, best)
     verdict = Verdict.OPTIMAL if is_proof else Verdict.SOLUTION
     return msgspec.structs.replace(run, status=Status.DONE, verdict=verdict)
+
+
+def _valid_count(count: int | None) -> int | None:
+    return count if count is not None and 0 <= count <= LARGEST_COUNT else None
 
 
 def _fault(team: Team, answer: PeerAnswer) -> str:

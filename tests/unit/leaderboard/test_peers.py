@@ -134,6 +134,10 @@ def test_faulty_programs_have_one_line(tmp_path: Path) -> None:
                 run = result(reporting(tmp_path, content))
                 assert (run.status, run.verdict) == (Status.ERROR, None)
                 assert text in (run.reason or "")
+    odd = result(reporting(tmp_path, {**ANSWER, "msg_count": -1}))
+    assert (odd.cost, odd.messages) == (399, None)
+    fifo = result(program(tmp_path, "mkfifo result.json"))
+    assert (fifo.status, fifo.reason) == (Status.ERROR, "ended with status 0, and wrote no result")
     crashed = result(program(tmp_path, "echo 'first'; printf 'bad \\033[31m' >&2; exit 3"))
     assert (crashed.status, crashed.reason) == (Status.ERROR, "bad \\x1b[31m")
 
