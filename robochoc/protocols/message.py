@@ -39,6 +39,9 @@ class Message(msgspec.Struct, frozen=True, tag=True, array_like=True):
     proves_nothing: ClassVar[bool] = False
     """True if its receivers learn nothing about other robots' problems from the message."""
 
+    masked: ClassVar[frozenset[str]] = frozenset()
+    """The fields that look the same to every minority of the robots, whatever the secrets of the other robots are."""
+
     def in_words(self, words: Wording) -> str:  # noqa: ARG002 - for overrides
         """Return the message as a sentence spoken by the sender: `V1.1 = 1 from now on`.
 
