@@ -16,6 +16,8 @@ from robochoc.journal.journal import Journal
 from robochoc.journal.team_events import run_parameters_of
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ConstraintModel
+from robochoc.privacy.coalitions import CoalitionReport, coalition_report
+from robochoc.privacy.errors import PrivacyError
 from robochoc.privacy.losses import Kind, Loss, PrivacyReport, loss_between
 from robochoc.privacy.observer import Observer, RunFacts
 from robochoc.privacy.possible import Secret
@@ -29,17 +31,8 @@ from robochoc.run.defaults import CENTRAL
 from robochoc.run.registry import protocol_by_class
 from robochoc.sniffer.recorded_messages import message_of, types_by_name
 from robochoc.solver.agent_problem import RunParameters
-from robochoc.system.errors import RobochocError
 
 Edge = tuple[str, str]
-
-
-class PrivacyError(RobochocError):
-    """The privacy loss cannot be measured. `broken`: the journal is damaged, or a message's rule is wrong."""
-
-    def __init__(self, why: str, *, broken: bool = False) -> None:
-        super().__init__(why)
-        self.broken = broken
 
 
 def privacy_of(
@@ -60,6 +53,47 @@ def privacy_of(
     Raises:
         PrivacyError: if the run does not exist, or required data are missing.
     """
+    runs, number, robots = _rebuilt(journal, options, number)
+    try:
+        return _RunMeasurement(journal, runs, number, robots, progress).report()
+    except CannotReplayError as why:
+        raise PrivacyError(str(why), broken=why.broken) from why
+    except TooManySecretsError as why:
+        raise PrivacyError(str(why)) from why
+
+
+def coalitions_of(
+    journal: Journal,
+    size: int,
+    options: ReplayOptions | None = None,
+    number: int | None = None,
+    *,
+    coins: int = 1,
+) -> CoalitionReport:
+    """Return what each coalition of `size` robots learns in a run; the run is repeated (`privacy/coalitions.py`).
+
+    Args:
+        journal: The journal, including the robots' problems.
+        size: The number of robots in a coalition.
+        options: Inputs besides the journal (`replay/rebuild.py`).
+        number: The number of the run, from 1; None for the last run.
+        coins: The number of seeds to try for the other robots' random numbers.
+
+    Raises:
+        PrivacyError: if the run does not exist, required data are missing, or the team is too large.
+    """
+    runs, number, robots = _rebuilt(journal, options, number)
+    given = runs[number - 1].given
+    parameters = RunParameters() if given is None else run_parameters_of(given)
+    team = robots.compiled.team
+    found = coalition_report(team, robots.protocol, size, parameters=parameters, coins=coins)
+    return replace(found, protocol=_protocol_name(journal, robots))
+
+
+def _rebuilt(
+    journal: Journal, options: ReplayOptions | None, number: int | None
+) -> tuple[list[RecordedRun], int, RebuiltRobots]:
+    """Return all runs, the number of the run to be measured, and its robots. Raises `PrivacyError`."""
     runs = list(runs_of(journal.events))
     if not runs:
         if journal.header.protocol == CENTRAL:
@@ -70,12 +104,14 @@ def privacy_of(
         raise PrivacyError(f"the journal has no run {number}, only {len(runs)}")
     try:
         rebuilder = Rebuilder(journal.header, options or ReplayOptions())
-        robots = [rebuilder.robots_of(run) for run in runs[:number]][-1]
-        return _RunMeasurement(journal, runs, number, robots, progress).report()
+        return runs, number, [rebuilder.robots_of(run) for run in runs[:number]][-1]
     except CannotReplayError as why:
         raise PrivacyError(str(why), broken=why.broken) from why
-    except TooManySecretsError as why:
-        raise PrivacyError(str(why)) from why
+
+
+def _protocol_name(journal: Journal, robots: RebuiltRobots) -> str:
+    found = protocol_by_class(robots.protocol.__name__, [journal.header.protocol])
+    return found[0] if found else robots.protocol.__name__
 
 
 class _RunMeasurement:
@@ -97,8 +133,7 @@ class _RunMeasurement:
         self._number = number
         self._run = runs[number - 1]
         self._robots = robots
-        found = protocol_by_class(robots.protocol.__name__, [journal.header.protocol])
-        self._name = found[0] if found else robots.protocol.__name__
+        self._name = _protocol_name(journal, robots)
         self._types = types_by_name(robots.protocol)
         self._team = robots.compiled.team
         given = self._run.given

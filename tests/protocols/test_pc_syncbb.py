@@ -31,6 +31,10 @@ def secret_of(chance: Random) -> Callable[[int], int]:
     return chance.getrandbits
 
 
+def constant(number: int) -> Callable[[int], int]:
+    return lambda _: number
+
+
 # Shares
 
 
@@ -51,11 +55,28 @@ def test_fewer_shares_look_the_same_for_every_secret() -> None:
     for secret in (0, 1, 17):
         shares = Counter[tuple[int, ...]]()
         for first, second in itertools.product(range(size), repeat=2):
-            one = field.share([secret], 2, 5, lambda _, drawn=first | second << 5: drawn)
+            one = field.share([secret], 2, 5, constant(first | second << 5))
             shares[one[1][0], one[4][0]] += 1
         seen.append(shares)
     assert seen[0] == seen[1] == seen[2]
     assert {*seen[0].values()} == {1}
+
+
+def test_a_multiplication_looks_the_same_for_all_factors() -> None:
+    """The first of three robots sees its own shares and all masked products: equally often with any factors."""
+    field, prime = Field(3), 7
+    seen = []
+    for one, two in ((0, 0), (3, 5)):
+        views = Counter[tuple[int, ...]]()
+        for slope, other, mask, low, high, square in itertools.product(range(prime), repeat=6):
+            shares = [((one + slope * place) * (two + other * place)) for place in (1, 2, 3)]
+            masked = [share + mask + high * place + square * place**2 for place, share in enumerate(shares, 1)]
+            views[
+                (one + slope) % prime, (two + other) % prime, (mask + low) % prime, *(each % prime for each in masked)
+            ] += 1
+        seen.append(views)
+        assert field.combine([[(one + slope) % prime], [(one + 2 * slope) % prime]]) == [one]
+    assert seen[0] == seen[1]
 
 
 def test_shares_that_are_not_elements_are_refused() -> None:
@@ -121,7 +142,7 @@ def test_both_searches_find_the_optimum_of_brute_force(number: int) -> None:
 TRIANGLE = with_costs(
     team_of(
         {"A": (1, 2), "B": (1, 2), "C": (1, 2)},
-        [priced(*pair, {(1, 1): 3, (1, 2): 1, (2, 1): 2, (2, 2): 5}) for pair in ("AB", "BC", "AC")],
+        [priced(one, two, {(1, 1): 3, (1, 2): 1, (2, 1): 2, (2, 2): 5}) for one, two in ("AB", "BC", "AC")],
     )
 )
 

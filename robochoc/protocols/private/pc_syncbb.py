@@ -182,7 +182,7 @@ class PCSyncBB(SharedArithmeticProtocol):
     @property
     def broken(self) -> int:
         """The cost of a broken hard constraint, above all sums of finite costs."""
-        return 1 << 2 * self.settings.bits // 3
+        return 1 << 2 * self.field.bits // 3
 
     @property
     def is_hidden(self) -> bool:

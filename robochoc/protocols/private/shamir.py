@@ -16,7 +16,7 @@ from functools import cache
 from operator import mul
 from typing import Final
 
-FIELD_BITS: Final = (5, 7, 13, 17, 19, 31, 61, 89, 107, 127)
+FIELD_BITS: Final = (3, 5, 7, 13, 17, 19, 31, 61, 89, 107, 127)
 """The supported values of b: 2^b - 1 is prime."""
 _DRAWN_AT_ONCE: Final = 512
 
