@@ -31,7 +31,7 @@ def print_coalitions(report: CoalitionReport) -> None:
     click.echo("  the rest by all messages")
     for line in table_lines(_COLUMNS, _rows(report), right=_COLUMNS[1:]):
         click.echo(on_one_line(f"  {line}"))
-    if not report.is_exact:
+    if not report.is_exact and any(one.excluded_by_messages for one in report.losses):
         tried = counted(report.coins, "seed")
         click.echo(f"  the other robots draw random numbers, tried with {tried}: the shares may be too high (--coins)")
 
