@@ -109,7 +109,7 @@ def coalition_report(
     coins: int = 1,
     costs: Sequence[float] = (),
 ) -> CoalitionReport:
-    """Return what each coalition of `size` robots learns in a run of `protocol`.
+    """Return the losses to each coalition of `size` robots in a run of `protocol`.
 
     Args:
         team: The team, with normalised costs.
@@ -172,7 +172,7 @@ def _check(team: Team, protocol: type[Protocol], size: int) -> None:
 
 def _possible_costs(team: Team) -> tuple[float, ...]:
     """Return the possible costs of an entry, as in `robochoc/privacy/secrets.py`."""
-    if team.kind is ProblemKind.DISCSP:
+    if team.kind == ProblemKind.DISCSP:
         return (0, INFINITE)
     finite = [cost for one in team.constraints() for _, cost in _entries(one, team) if cost < INFINITE]
     return (*range(int(max(finite, default=0)) + 1), INFINITE)
@@ -221,7 +221,7 @@ def _with_costs(
     constraint: Constraint, rows: Sequence[tuple[int, ...]], prices: Sequence[float], kind: ProblemKind
 ) -> Constraint:
     names = constraint.variables
-    if kind is ProblemKind.DISCSP:
+    if kind == ProblemKind.DISCSP:
         broken = tuple(values for values, price in zip(rows, prices, strict=True) if price == INFINITE)
         relation = Relation(constraint.name, len(names), Semantics.CONFLICTS, broken)
     else:

@@ -70,7 +70,7 @@ def coalitions_of(
     *,
     coins: int = 1,
 ) -> CoalitionReport:
-    """Return what each coalition of `size` robots learns in a run; the run is repeated (`privacy/coalitions.py`).
+    """Return the losses to each coalition of `size` robots in a run, which is repeated (`privacy/coalitions.py`).
 
     Args:
         journal: The journal, including the robots' problems.

@@ -151,7 +151,7 @@ TRIANGLE = with_costs(
 @pytest.mark.parametrize("search", Search)
 def test_processes_find_it_too(search: Search) -> None:
     outcome = solve(TRIANGLE, replace(options_of(search=search), runtime=Runtime.PROCESSES))
-    assert outcome.verdict is Verdict.OPTIMAL
+    assert outcome.verdict == Verdict.OPTIMAL
     assert outcome.cost == minimum_cost(TRIANGLE)
 
 

@@ -187,7 +187,7 @@ class PCSyncBB(SharedArithmeticProtocol):
     @property
     def is_hidden(self) -> bool:
         """True if the answers of comparisons are not opened."""
-        return self.settings.search is Search.HIDDEN
+        return self.settings.search == Search.HIDDEN
 
     def start(self) -> None:
         """Send the number of values; a robot alone decides."""
