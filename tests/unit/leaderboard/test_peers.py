@@ -279,5 +279,7 @@ def test_the_command_runs_peers_beside_protocols(tmp_path: Path) -> None:
     done = robochoc_within("leaderboard", "run", *words, "-o", path)
     assert done.stderr == "pydcop:dpop on random-small-0 claims the cost 1, but its assignment costs 399\n"
     assert [run["protocol"] for run in json.loads(path.read_text())["runs"]] == ["dpop", "pydcop:dpop"]
+    alone = robochoc_within("leaderboard", "run", *words[1:], "-o", tmp_path / "alone.json")
+    assert (alone.returncode, alone.stdout.partition(";")[0]) == (0, f"{tmp_path / 'alone.json'}: 1 run")
     checked = robochoc_within("leaderboard", "verify", path, "--rerun", "1", "--jobs", "1")
     assert (checked.returncode, "2 answers are right" in checked.stdout) == (0, True)
