@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from decimal import Decimal
 from itertools import islice
 
 import msgspec
@@ -26,6 +27,7 @@ from robochoc.model.problem import (
     ScenarioEvent,
     Team,
 )
+from robochoc.model.uncertainty import is_uncertain, random_variables
 
 MOST_VARIABLES = 20_000
 """The maximum number of decisions listed with their robots."""
@@ -125,9 +127,18 @@ def facts_of(team: Team, *, files: Sequence[str] = (), notes: Sequence[str] = ()
         events=events_in_words(team),
         flies=bool(team.robots) and all(map(has_place, team.robots)),
         files=tuple(files),
-        notes=tuple(note[:_LONGEST_NOTE] for note in notes[:_MOST_NOTES]),
+        notes=tuple(note[:_LONGEST_NOTE] for note in [*_random(team), *notes][:_MOST_NOTES]),
         origin=origin,
     )
+
+
+def _random(team: Team) -> Iterator[str]:
+    """Yield a sentence for each random variable of a team."""
+    for one in random_variables(team) if is_uncertain(team) else ():
+        weighted = zip(one.outcomes, one.weights, strict=True)
+        chances = ", ".join(f"{value} ({Decimal(weight).scaleb(-one.places):f})" for value, weight in weighted)
+        later = say("imported.observed", names=", ".join(one.seen_by)) if one.seen_by else ""
+        yield say("imported.random", name=one.name, chances=chances) + later
 
 
 def events_in_words(team: Team) -> tuple[str, ...]:

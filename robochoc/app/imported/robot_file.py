@@ -91,7 +91,11 @@ def _in_words(constraint: Constraint, symbols: Sequence[str], units: CostUnits) 
             return _Reading(dict(zip(formals, constraint.parameters, strict=True)), symbolic, symbols).text(body)
         case Function(parameters=formals, body=body, symbolic=symbolic):
             given = dict(zip(formals, constraint.parameters, strict=True))
-            return say("imported.costs", says=_Reading(given, symbolic, symbols).text(body))
+            text = _Reading(given, symbolic, symbols).text(body)
+            if constraint.definition.places:
+                unit = cost_shown(CostUnits(places=constraint.definition.places).in_user_units(1))
+                text = say("imported.scaled", unit=unit, says=text)
+            return say("imported.costs", says=text)
 
 
 def _table(constraint: Constraint, relation: Relation, symbols: Sequence[str], units: CostUnits) -> str:

@@ -40,6 +40,13 @@ def kept(path: Path, folder: Path) -> tuple[TeamStore, str]:
     return store, store.add_imported(found)
 
 
+def test_random_variables_are_told_and_their_costs_have_their_unit() -> None:
+    folder = ROOT / "docs/examples/gusts"
+    told = "Chance decides wind: 0 (0.7), 3 (0.3). Costs are expected costs. Decided after it is known: relay."
+    assert facts_of(read_team(folder)).notes == (told,)
+    assert "costs 0.1 · (" in read_robot_file(folder, "Camera").sentences[0]
+
+
 def test_what_happens_to_a_team_is_told_and_who_joins_is_known() -> None:
     found = facts_of(read_team(RESCUE), origin="rescue")
     assert found.events[:2] == ("When it has decided: East leaves.", "When it has decided: Spare comes.")
