@@ -5,16 +5,26 @@ from __future__ import annotations
 from fractions import Fraction
 from pathlib import Path
 
+import pytest
+
+import robochoc
+from robochoc.communication.kill_schedule import Kill
+from robochoc.formats import read_team
 from robochoc.formats.dialects.dialect import ImportOptions
 from robochoc.formats.dialects.registry import read_foreign
 from robochoc.model.outcome import Verdict
 from robochoc.model.policies import Risk
 from robochoc.model.uncertainty import is_uncertain
-from robochoc.run.options import Options, Runtime
+from robochoc.replay import replay
+from robochoc.run.options import OnLoss, Options, Runtime
 from robochoc.run.orchestrator import solve
 from tests.support.examples import count, drawn
+from tests.support.program import ROOT
+from tests.support.replays import identical, recorded
 from tests.support.uncertain import frodo_xml, uncertain_problem
 
+GUSTS = ROOT / "docs" / "examples" / "gusts"
+SIMULATED = Options(protocol="dpop", runtime=Runtime.SIMULATOR)
 PROTOCOLS = ("dpop", "syncbb", "afb", "adopt", "central")
 
 
@@ -58,3 +68,40 @@ def test_problems_of_frodo_cost_the_same(problems: int, tmp_path: Path) -> None:
             outcome = solve(team, Options(protocol="dpop", runtime=Runtime.SIMULATOR, risk=risk))
             found = None if outcome.cost is None else Fraction(outcome.cost) + constant
             assert found == best
+
+
+def test_robots_withdraw_if_no_policy_is_possible_in_every_scenario() -> None:
+    """A calm day alone is not enough: with wind, the two robots cannot both stay."""
+    model = robochoc.Model("crowded")
+    one, other = (model.robot(name).variable("place", range(2)) for name in ("one", "other"))
+    wind = model.random("wind", {0: 0.9, 1: 0.1}, seen_by=[one])
+    model.add(one + wind < 2, other != one, other < 1)
+    outcome = model.solve("sfb", withdraw="minimum")
+    assert (outcome.verdict, len(outcome.withdrawn)) == (Verdict.OPTIMAL, 1)
+    assert outcome.uncertainty is not None
+    assert outcome.uncertainty.expected is None
+
+
+def test_a_recorded_run_is_replayed() -> None:
+    chance = drawn("recorded uncertainty")
+    for _ in range(4):
+        assert identical(replay(recorded(uncertain_problem(chance).team, SIMULATED)))
+
+
+@pytest.mark.more
+def test_processes_and_a_network_give_the_same_policy() -> None:
+    team = read_team(GUSTS)
+    for runtime in (Runtime.PROCESSES, Runtime.NETWORK):
+        for risk, cost in ((Risk.EXPECTED, Fraction(15, 2)), (Risk.WORST, Fraction(12))):
+            outcome = solve(team, Options(protocol="dpop", runtime=runtime, risk=risk))
+            assert outcome.cost is not None
+            assert Fraction(outcome.cost) == cost
+
+
+@pytest.mark.more
+def test_the_others_continue_without_a_lost_robot() -> None:
+    team = read_team(GUSTS)
+    options = Options(protocol="dpop", on_loss=OnLoss.WITHDRAW, kill=(Kill("Camera", 0.0),))
+    outcome = solve(team, options)
+    assert outcome.lost == ("Camera",)
+    assert outcome.assignment.keys() == {"relay.wind.0", "relay.wind.3"}
