@@ -27,6 +27,8 @@ from robochoc.system.plain_text import counted
 
 MAX_OUTCOMES = 4096
 """The maximum number of joint outcomes on which a constraint or a variable depends."""
+MAX_PARTS = 2_000_000
+"""The maximum number of variables, constraints and costs in a robot's deterministic equivalent."""
 
 Scenario = Mapping[str, int]
 """Outcomes of random variables, by name."""
@@ -162,6 +164,7 @@ class _Expectation:
             )
         self._finer: int = 10 ** (places - robot.costs.places)
         self._declared = robot_in_places(robot, places)
+        self._parts = 0
         self._scaled: dict[tuple[int, int, int], tuple[Relation | Function, Relation | Function]] = {}
 
     def robot(self) -> Robot:
@@ -208,7 +211,7 @@ class _Expectation:
         return places - _final_zeros(amount, places) if amount else 0
 
     def _variables(self, variable: Variable) -> Iterator[Variable]:
-        _check_number(self._outcomes.seen(variable.name), f"the variable {variable.name}")
+        self._count(_check_number(self._outcomes.seen(variable.name), f"the variable {variable.name}"))
         return (replace(variable, name=name) for name in self._outcomes.decisions(variable.name))
 
     def _decisions(self, variables: Iterable[str]) -> tuple[str, ...]:
@@ -226,7 +229,7 @@ class _Expectation:
 
     def _in_all_outcomes(self, constraint: Constraint) -> Iterator[Constraint]:
         randoms = self._outcomes.on_which(constraint.scope)
-        _check_number(randoms, f"the constraint {constraint.name}", constraint.line)
+        self._count(_check_number(randoms, f"the constraint {constraint.name}", constraint.line))
         places = sum(one.places for one in randoms)
         for weight, scenario in self._outcomes.scenarios(randoms):
             yield self._weighted(self._outcomes.in_scenario(constraint, scenario), weight, places)
@@ -239,6 +242,7 @@ class _Expectation:
             case Relation(semantics=Semantics.SOFT) as relation:
                 key = id(relation), weight, places
                 if key not in self._scaled:
+                    self._count(len(relation.costs))
                     costs = tuple(_expected(constraint, cost, weight, places) for cost in relation.costs)
                     default = _expected(constraint, relation.default_cost, weight, places)
                     self._scaled[key] = relation, replace(relation, costs=costs, default_cost=default)
@@ -253,6 +257,14 @@ class _Expectation:
                 return replace(constraint, definition=self._scaled[key][1])
             case _:
                 return constraint
+
+    def _count(self, parts: int) -> None:
+        self._parts += parts
+        if self._parts > MAX_PARTS:
+            raise UncertaintyError(
+                f"the variables, constraints and costs in all outcomes are more than {MAX_PARTS:,}",
+                "use fewer outcomes, smaller relations, or fewer variables in seen_by",
+            )
 
 
 def _expected(constraint: Constraint, cost: float, weight: int, places: int) -> float:
@@ -276,7 +288,8 @@ def _final_zeros(number: int, most: int) -> int:
     return zeros
 
 
-def _check_number(randoms: Sequence[RandomVariable], what: str, line: int = 0) -> None:
+def _check_number(randoms: Sequence[RandomVariable], what: str, line: int = 0) -> int:
+    """Return the number of joint outcomes of `randoms`. Raises `UncertaintyError` if there are too many."""
     number = math.prod(len(one.outcomes) for one in randoms)
     if number > MAX_OUTCOMES:
         raise UncertaintyError(
@@ -284,6 +297,7 @@ def _check_number(randoms: Sequence[RandomVariable], what: str, line: int = 0) -
             f"use at most {MAX_OUTCOMES:,}: fewer outcomes, or fewer random variables in one constraint",
             line,
         )
+    return number
 
 
 def _word(outcome: int) -> str:

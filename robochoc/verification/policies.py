@@ -17,11 +17,8 @@ from robochoc.model.outcome import Outcome
 from robochoc.model.policies import Choice, PolicyReport, Risk
 from robochoc.model.problem import INFINITE, Assignment, Constraint, Function, RandomVariable, Team
 from robochoc.model.uncertainty import Outcomes, declared_robots, random_variables
-from robochoc.model.worst_case import connected
-from robochoc.verification.checker import RefutedError, constraint_cost
-
-MAX_SCENARIOS = 65_536
-"""The maximum number of joint outcomes of connected random variables for which the worst case is computed."""
+from robochoc.model.worst_case import MAX_EVALUATIONS, connected
+from robochoc.verification.checker import RefutedError
 
 Scenario = Mapping[str, int]
 
@@ -98,7 +95,7 @@ class _Costs:
         total = self._constant + sum(self._cost(one, {}) for one, randoms in self._on if not randoms)
         worst_scenario: dict[str, int] = {}
         for group, randoms in connected(self._outcomes, (one for one, some in self._on if some)):
-            if math.prod(len(one.outcomes) for one in randoms) > MAX_SCENARIOS:
+            if math.prod(len(one.outcomes) for one in randoms) * len(group) > MAX_EVALUATIONS:
                 return None
             costs = [(sum(self._cost(one, case) for one in group), case) for case in _joint(randoms)]
             cost, case = (min if self._units.maximize else max)(costs, key=lambda one: one[0])
@@ -112,7 +109,7 @@ class _Costs:
             name: scenario[name] if name in scenario else self._assignment[str(self._outcomes.term(name, scenario))]
             for name in constraint.variables
         }
-        cost = constraint_cost(constraint, values)
+        cost = constraint.price(values)
         if cost == INFINITE:
             case = ", ".join(f"{name} = {value}" for name, value in scenario.items()) or "every scenario"
             raise RefutedError(f"constraint {constraint.name} is violated if {case}")

@@ -136,3 +136,23 @@ def test_a_robot_with_random_variables_must_be_converted() -> None:
 def test_the_worst_case_is_limited_and_needs_random_variables() -> None:
     with pytest.raises(UnsupportedError, match="scouts has no random variables"):
         solve(read_team(ROOT / "docs" / "examples" / "scouts"), replace(SIMULATED, risk=Risk.WORST))
+
+
+def test_too_many_outcomes_are_refused(tmp_path: Path) -> None:
+    more = "".join(f'<random name="r{number}">0.5:0|0.5:1</random>' for number in range(13))
+    formals = [f"X{number}" for number in range(13)]
+    scope = " ".join(f"r{number}" for number in range(13))
+    parameters = f"<parameters>{' '.join(f'int {name}' for name in formals)} int H</parameters>"
+    total = f"add({','.join(formals)},H)"
+    body = "<expression><functional>{}</functional></expression>"
+    function = f'<function name="f">{parameters}{body.format(total)}</function></functions>'
+    predicate = f'<predicate name="p">{parameters}{body.format(f"ge({total},0)")}</predicate></predicates>'
+    declared = ("</random_variables>", f"{more}</random_variables>")
+    for file, own, definition, reference, message in (
+        ("Camera.xml", "camera", ("</functions>", function), "blur", "3 the expected costs have 13 decimal places"),
+        ("Relay.xml", "relay", ("</predicates>", predicate), "calm", "26 the constraint safe depends on 8,192 joint"),
+    ):
+        name = "f" if reference == "blur" else "p"
+        applied = (f'reference="{reference}" scope="{own} wind"', f'reference="{name}" scope="{scope} {own}"')
+        found = mistakes_in(tmp_path / file, file, declared, definition, applied)
+        assert found[0].startswith(f"{file}:{message}")
