@@ -150,7 +150,7 @@ def test_too_many_outcomes_are_refused(tmp_path: Path) -> None:
     declared = ("</random_variables>", f"{more}</random_variables>")
     for file, own, definition, reference, message in (
         ("Camera.xml", "camera", ("</functions>", function), "blur", "3 the expected costs have 13 decimal places"),
-        ("Relay.xml", "relay", ("</predicates>", predicate), "calm", "26 the constraint safe depends on 8,192 joint"),
+        ("Relay.xml", "relay", ("</predicates>", predicate), "calm", "26 the constraint safe depends on 16,384 joint"),
     ):
         name = "f" if reference == "blur" else "p"
         applied = (f'reference="{reference}" scope="{own} wind"', f'reference="{name}" scope="{scope} {own}"')
