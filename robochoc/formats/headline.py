@@ -53,6 +53,8 @@ def counted_solutions(count: int, outcome: Outcome) -> str:
 
 
 def _solution(outcome: Outcome) -> str:
+    if outcome.front:
+        return f"Pareto front of {len(outcome.front):,} point{'s' * (len(outcome.front) != 1)}"
     return "optimal solution" if outcome.verdict == Verdict.OPTIMAL else "solution"
 
 
@@ -65,6 +67,10 @@ def _lost(outcome: Outcome) -> str:
 
 
 def _cost(outcome: Outcome) -> str:
+    if outcome.front:
+        return ""
+    if outcome.objectives:
+        return "".join(f", {name} {cost_shown(cost)}" for name, cost in outcome.objectives.items())
     if outcome.cost is None or not (outcome.cost or outcome.verdict == Verdict.OPTIMAL):
         return ""
     return f", cost {cost_shown(outcome.cost)}"

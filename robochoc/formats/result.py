@@ -21,7 +21,7 @@ from typing import Any, NoReturn
 
 import msgspec
 
-from robochoc.model.outcome import Answer, CheckCounts, Improvement, Metrics, Optima, Outcome, SearchStage
+from robochoc.model.outcome import Answer, CheckCounts, FrontPoint, Improvement, Metrics, Optima, Outcome, SearchStage
 from robochoc.model.real import MOST_PLACES
 from robochoc.system.decode_errors import describe_decode_error
 from robochoc.system.errors import RobochocError
@@ -99,7 +99,7 @@ def _in_json(name: str, value: Any, outcome: Outcome) -> Any:  # noqa: ANN401, C
         case Improvement():
             found = {key: _in_json(key, one, outcome) for key, one in value._asdict().items()}
             return {"seconds": found.pop("at_s"), **found}
-        case CheckCounts() | Optima() | SearchStage():
+        case CheckCounts() | FrontPoint() | Optima() | SearchStage():
             return {key: _in_json(key, one, outcome) for key, one in value._asdict().items()}
         case Mapping():
             if name == "assignment":
@@ -219,6 +219,11 @@ def _answer_fields(answer: Json, symbols: _Symbols) -> Json:
         found["checked"] = [counts.get(name) for name in CheckCounts._fields]
     if isinstance(optima := found.get("optima"), dict):
         found["optima"] = [optima.get("number"), [symbols.codes_of(one) for one in _items(optima.get("assignments"))]]
+    if isinstance(front := found.get("front"), list):
+        found["front"] = [
+            [one.get("objectives"), symbols.codes_of(one.get("assignment"))] if isinstance(one, dict) else one
+            for one in front
+        ]
     if isinstance(found.get("improvements"), list):
         found["improvements"] = [*map(_improvement_fields, found["improvements"])]
     if isinstance(spent := found.get("preprocessing"), dict):

@@ -53,7 +53,11 @@ def refuse_several_objectives(one: Team | Robot) -> None:
     """Raise `SeveralObjectivesError` if the costs of a team or a robot belong to several objectives."""
     if one.objectives:
         names = ", ".join(one.objectives)
-        raise SeveralObjectivesError(f"there are several objectives ({names}), and this requires a single cost")
+        weights = ",".join(f"{name}=1" for name in one.objectives)
+        raise SeveralObjectivesError(
+            f"there are several objectives ({names}), and this requires a single cost: solve the team with --objectives"
+            f" weighted:{weights}, or export its problem with a single cost and import it"
+        )
 
 
 _NORMALIZED = "_normalized"

@@ -92,6 +92,7 @@ def _answer(answer: Answer, names: Mapping[str, str]) -> dict[str, Any]:
         "witness": _one(answer.witness, names),
         "tree": _tree(answer.tree, names),
         "optima": optima and optima._replace(assignments=tuple(_by(one, names) for one in optima.assignments)),
+        "front": tuple(one._replace(assignment=_by(one.assignment, names)) for one in answer.front),
         "improvements": _improvements(answer.improvements, names),
         "dropped_constraints": _dropped(answer.dropped_constraints, names),
         "violations": answer.violations and _violations(answer.violations, names),

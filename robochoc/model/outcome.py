@@ -153,6 +153,18 @@ class Optima(NamedTuple):
     assignments: tuple[dict[str, int], ...]
 
 
+class FrontPoint(NamedTuple):
+    """A point of the Pareto front of several objectives.
+
+    Attributes:
+        objectives: The cost in each objective, in the user's units.
+        assignment: The values of all variables, as in `Answer`.
+    """
+
+    objectives: dict[str, Cost]
+    assignment: dict[str, int]
+
+
 @dataclass(frozen=True)
 class Preprocessing:
     """The result of preprocessing by the robots, before the protocol started, summed over all epochs.
@@ -244,6 +256,8 @@ class Answer:
         checked: The number of checked constraints in a run across machines, by the robots that checked them.
         preprocessing: The result of preprocessing, if it was requested.
         optima: The optima, or the solutions, if the protocol lists them.
+        objectives: The cost of the assignment in each objective, if there are several.
+        front: The points of the Pareto front, if it was requested; the first one is the assignment.
         deadline: The deadline in seconds, if it ended the search. The answer is then the best assignment known at that
             time.
         improvements: The answers published during the search; the first was published at the deadline.
@@ -274,6 +288,8 @@ class Answer:
     checked: CheckCounts | None = None
     preprocessing: Preprocessing | None = None
     optima: Optima | None = None
+    objectives: dict[str, Cost] = field(default_factory=dict)
+    front: tuple[FrontPoint, ...] = ()
     deadline: float | None = None
     improvements: tuple[Improvement, ...] = ()
     dropped_constraints: tuple[DroppedConstraint, ...] = ()

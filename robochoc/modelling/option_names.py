@@ -39,6 +39,7 @@ _WORDS = {
     "with": "ace|ortools",
     "protocol": r"[a-z][a-z0-9-]*",
     "set": r"\w+=\S+",
+    "objectives": "pareto",
 }
 """The words that can be the value of the option before them. Other words continue the sentence."""
 _NUMBER = re.compile(r"[\d.]+(e[+-]?\d+)?|[A-Z]+")

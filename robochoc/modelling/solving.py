@@ -95,6 +95,7 @@ class Solvable(ABC):
         answer: str = AnswerRule.BEST,
         repair: bool = True,
         risk: str = Risk.EXPECTED,
+        objectives: str | None = None,
         cluster: str | None = None,
         journal: Path | str | None = None,
         html: Path | str | None = None,
@@ -157,6 +158,8 @@ class Solvable(ABC):
             repair: True if a local search repairs the assignment of an incomplete protocol that has ended with violated
                 hard constraints, unless the answer is `final` or there are limits other than on time.
             risk: The minimised cost of a problem with random variables: `expected`, or `worst` of all scenarios.
+            objectives: The treatment of several objectives: `weighted:NAME=WEIGHT,...`, `lexicographic:NAME,...` or
+                `pareto`. None: `pareto`, if there are several.
             cluster: With arrays: the address of a Dask scheduler, or the path of its file. Its workers compute the run.
                 None: this process does.
             journal: The file to which the journal of the run is written: all messages and decisions.

@@ -37,12 +37,23 @@ class Listing(msgspec.Struct, frozen=True):
     limit: int
 
 
+class ListedPoints(msgspec.Struct, frozen=True):
+    """The indices of a robot's values in the points of its tree's Pareto front, and for a root also the packed costs.
+
+    See `model/objectives.py` on packed costs.
+    """
+
+    places: list[int]
+    packed: list[int]
+
+
 class Findings(msgspec.Struct, frozen=True):
     """A robot's knowledge about the whole search; None for information that the robot or its protocol does not have.
 
     `bound` is a lower bound on the cost of every assignment of the robots that it covers (for a root: the robots of its
     tree; for the first robot: all). `count` is the number of optima of a root's tree, in hexadecimal digits, because it
-    may need more than 64 bits; `listing` contains the robot's values in some of these optima. `left` contains the
+    may need more than 64 bits; `listing` contains the robot's values in some of these optima; `points`
+    contains its values in the points of a Pareto front. `left` contains the
     indices of the values that remain after preprocessing.
     """
 
@@ -53,6 +64,7 @@ class Findings(msgspec.Struct, frozen=True):
     left: tuple[int, ...] | None = None
     count: str | None = None
     listing: Listing | None = None
+    points: ListedPoints | None = None
 
 
 NO_FINDINGS = Findings()

@@ -47,6 +47,7 @@ class Traits:
         no_replay: The reason why its runs can never be replayed; empty if they can.
         needs: A required module of an extra, and the command to install it. A run is refused if the module is missing.
         counts: Its robots also count the optima, or the solutions if there are no costs (`--count`).
+        fronts: Its robots find the Pareto front of several objectives.
         arrays: It has an array implementation that runs a whole team at once (`communication/arrays`).
         bears_loss: It continues when messages are lost in transit (`Protocol.miss`, `Protocol.go_on`).
         allocates: It accepts only task allocations: teams whose only shared constraints are that a task is done by at
@@ -84,6 +85,7 @@ class Traits:
     no_replay: str = ""
     needs: tuple[str, str] | None = None
     counts: bool = False
+    fronts: bool = False
     arrays: bool = False
     bears_loss: bool = False
     allocates: bool = False

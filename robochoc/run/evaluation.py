@@ -13,12 +13,12 @@ from typing import NamedTuple
 from robochoc.communication.search_result import SearchResult
 from robochoc.model.cost_units import Cost
 from robochoc.model.costs import user_cost
-from robochoc.model.outcome import Answer, EpochOutcome, Metrics, Optima, Outcome, Verdict, Violations
+from robochoc.model.outcome import Answer, EpochOutcome, FrontPoint, Metrics, Optima, Outcome, Verdict, Violations
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.model.team_edits import dropped_constraints
 from robochoc.run.incumbent import best_known, least_violating, lower_bound, merged_values, optima, pseudo_tree
 from robochoc.run.known_costs import DecidedValues
-from robochoc.run.listed_optima import combined_optima
+from robochoc.run.listed_optima import combined_front, combined_optima
 from robochoc.run.phases import RunPhase
 from robochoc.run.starts import robots_values
 from robochoc.solver.compiled_team import CompiledTeam
@@ -153,6 +153,7 @@ def evaluate_search(
         bound=bound,
         reason=found.reason,
         optima=found.optima,
+        front=found.front,
         **found.assignment_parts(),
     )
 
@@ -250,6 +251,7 @@ def check_with_files(
     in_order = {name: assignment[name] for name in team.variables if name in assignment}
     paid = user_cost(team, assignment_cost(team, assignment), without=withdrawn)
     listed = _checked_optima(phase, result, team, compiled, paid)
+    front = _checked_front(phase, result, team, compiled)
     dropped = dropped_constraints(team, withdrawn)
     return Answer(
         Verdict.UNKNOWN,
@@ -258,6 +260,7 @@ def check_with_files(
         withdrawn=withdrawn,
         verified=True,
         optima=listed,
+        front=front,
         dropped_constraints=dropped,
     )
 
@@ -306,6 +309,25 @@ def _checked_optima(
         if user_cost(team, assignment_cost(team, assignment), without=withdrawn) != cost:
             raise RefutedError(f"the optima that were listed for {team.name} do not cost the same")
     return Optima(number, tuple([{name: one[name] for name in team.variables if name in one} for one in listed]))
+
+
+def _checked_front(phase: RunPhase, result: SearchResult, team: Team, compiled: CompiledTeam) -> tuple[FrontPoint, ...]:
+    """Return the points of the Pareto front that the robots listed, each checked; empty if none was requested.
+
+    The costs in each objective are added by the run, which has the files.
+
+    Raises:
+        RefutedError: when a point violates a constraint, or its costs are not those that the robots claim.
+    """
+    bases = phase.parameters.settings.get("bases", "")
+    if not (bases and phase.traits.fronts and is_proven(phase, result)):
+        return ()
+    found = combined_front(compiled, result, tuple(map(int, bases.split(","))))
+    for packed, assignment in found or ():
+        check_assignment(team, assignment)
+        if assignment_cost(team, assignment) != packed:
+            raise RefutedError(f"a point of the front of {team.name} does not have the costs that the robots claim")
+    return tuple([FrontPoint({}, {name: one[name] for name in team.variables}) for _, one in found or ()])
 
 
 def check_assignment(

@@ -1,4 +1,4 @@
-"""The optima of the team, combined from the optima that the robots of each tree have listed, and checked.
+"""The optima, or the Pareto front, of the team, combined from the lists of the robots of each tree.
 
 See `protocols/inference/list_dpop`. Each root has numbered the optima of its tree, and each robot stores its value in
 each of the first optima. Different trees share no constraint, so the optima of the team are all combinations of the
@@ -12,10 +12,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from robochoc.communication.search_result import SearchResult
+from robochoc.model.objectives import non_dominated
 from robochoc.protocols.findings import Findings
 from robochoc.run.incumbent import optima
 from robochoc.solver.compiled_team import CompiledTeam
+from robochoc.solver.errors import TooLargeError
 from robochoc.verification.checker import RefutedError
+
+MOST_POINTS = 100_000
+"""The maximum number of points of a team's Pareto front."""
 
 
 class _Tree(NamedTuple):
@@ -35,7 +40,7 @@ def combined_optima(compiled: CompiledTeam, result: SearchResult) -> tuple[int, 
     number = optima(result.findings)
     if number is None or len(listings) < len(compiled.team.robots):
         return None
-    trees = [*_trees(result.findings)]
+    trees = [*_trees(result.findings, {name: one.places for name, one in listings.items()})]
     limit = min(number, *(one.limit for one in listings.values()))
     found = [_combined(compiled, trees, place) for place in range(min(limit, math.prod(one.listed for one in trees)))]
     if len({tuple(sorted(one.items())) for one in found}) < len(found):
@@ -43,28 +48,69 @@ def combined_optima(compiled: CompiledTeam, result: SearchResult) -> tuple[int, 
     return number, found
 
 
-def _combined(compiled: CompiledTeam, trees: Sequence[_Tree], number: int) -> dict[str, int]:
-    """Return the assignment number `number` among all combinations of the trees' optima."""
-    assignment: dict[str, int] = {}
-    left = number
+def combined_front(
+    compiled: CompiledTeam, result: SearchResult, bases: Sequence[int]
+) -> list[tuple[int, dict[str, int]]] | None:
+    """Return the points of the Pareto front: their packed costs, ascending, each with an assignment.
+
+    None: the robots have not listed points. `bases`: the number system of packed costs (`model/objectives.py`).
+
+    Raises:
+        RefutedError: if the robots of a tree have listed different numbers of points.
+        TooLargeError: if the fronts of several trees add up to too many points.
+    """
+    points = {name: found.points for name, found in result.findings.items() if found.points is not None}
+    if len(points) < len(compiled.team.robots):
+        return None
+    total: dict[int, tuple[int, ...]] = {0: ()}
+    trees = [*_trees(result.findings, {name: one.places for name, one in points.items()})]
     for tree in trees:
-        left, at = divmod(left, tree.listed)
+        packed = points[_root(result.findings, next(iter(tree.places)))].packed
+        if len(packed) != tree.listed:
+            raise RefutedError(f"a root of {compiled.team.name} has listed {len(packed)} costs of {tree.listed} points")
+        sums = {
+            one + other: (*before, place)
+            for place, other in reversed([*enumerate(packed)])
+            for one, before in reversed(total.items())
+        }
+        total = {one: sums[one] for one in non_dominated(sums, bases)}
+        if len(total) > MOST_POINTS:
+            raise TooLargeError(f"the Pareto front of {compiled.team.name} has more than {MOST_POINTS:,} points")
+    return [(one, _assignment(compiled, trees, places)) for one, places in total.items()]
+
+
+def _assignment(compiled: CompiledTeam, trees: Sequence[_Tree], numbers: Sequence[int]) -> dict[str, int]:
+    """Return the assignment with these listed assignments of the trees."""
+    assignment: dict[str, int] = {}
+    for tree, number in zip(trees, numbers, strict=True):
         for name, places in tree.places.items():
-            assignment.update(compiled[name].solution(places[at]))
+            assignment.update(compiled[name].solution(places[number]))
     return assignment
 
 
-def _trees(findings: Mapping[str, Findings]) -> Iterator[_Tree]:
-    """Yield the trees. Raises `RefutedError` if the robots of a tree have listed different numbers of optima."""
+def _combined(compiled: CompiledTeam, trees: Sequence[_Tree], number: int) -> dict[str, int]:
+    """Return the assignment number `number` among all combinations of the trees' optima."""
+    numbers = []
+    for tree in trees:
+        number, at = divmod(number, tree.listed)
+        numbers.append(at)
+    return _assignment(compiled, trees, numbers)
+
+
+def _trees(findings: Mapping[str, Findings], listed: Mapping[str, list[int]]) -> Iterator[_Tree]:
+    """Yield the trees, for the indices that each robot has `listed`.
+
+    Raises:
+        RefutedError: if the robots of a tree have listed different numbers of assignments.
+    """
     trees: dict[str, dict[str, list[int]]] = {}
-    for name, found in findings.items():
-        if found.listing is not None:
-            trees.setdefault(_root(findings, name), {})[name] = found.listing.places
+    for name, own in listed.items():
+        trees.setdefault(_root(findings, name), {})[name] = own
     for root, places in trees.items():
         sizes = {len(own) for own in places.values()}
         if len(sizes) > 1:
             raise RefutedError(
-                f"the robots below {root} have listed different numbers of optima, from {min(sizes)} to {max(sizes)}"
+                f"the robots below {root} list different numbers of assignments, from {min(sizes)} to {max(sizes)}"
             )
         yield _Tree(places, *sizes)
 

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from enum import StrEnum
 from numbers import Real
 
+from robochoc.model.objectives import ObjectivesMode, objectives_mode
 from robochoc.model.orders import Order
 from robochoc.run.defaults import AUTO
 from robochoc.system.errors import OptionError, OptionTypeError
@@ -144,6 +145,18 @@ def channel_model(name: str, value: object) -> object:
     from robochoc.communication.simulator.channel import ChannelModel  # noqa: PLC0415 - start-up: rarely needed
 
     return instance_of(ChannelModel)(name, value)
+
+
+def objectives(name: str, value: object) -> object:
+    """Accept an `ObjectivesMode`, or its text."""
+    if isinstance(value, ObjectivesMode):
+        return value
+    try:
+        return objectives_mode(text(name, value))
+    except OptionTypeError:
+        raise
+    except ValueError as invalid:
+        raise OptionError(f"{name}: {invalid}") from None
 
 
 def kill(name: str, value: object) -> object:

@@ -8,6 +8,7 @@ from enum import StrEnum
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
+from robochoc.model.objectives import ObjectivesMode
 from robochoc.model.orders import Order
 from robochoc.model.policies import Risk
 from robochoc.run.defaults import AUTO
@@ -19,6 +20,7 @@ from robochoc.run.option_values import (
     integer,
     items_of,
     kill,
+    objectives,
     one_of,
     optional,
     priority_order,
@@ -176,6 +178,8 @@ class Options:
             `protocol` searches). They are chosen, not given.
         risk: The optimised cost of a problem with random variables.
         bounds: True if events report lower bounds of the cost that robots have proven (processes and simulator).
+        objectives: The treatment of several objectives: an `ObjectivesMode`, or its text. None: `pareto`, if the
+            protocol is chosen or finds fronts.
     """
 
     protocol: str = AUTO
@@ -215,6 +219,7 @@ class Options:
     cold: bool = False
     stages: tuple[Stage, ...] = ()
     risk: Risk = Risk.EXPECTED
+    objectives: ObjectivesMode | None = None
 
     def __post_init__(self) -> None:
         for name, given in vars(self).copy().items():
@@ -296,6 +301,7 @@ _CONVERTERS = MappingProxyType(
         "start": start_values,
         "cold": flag,
         "risk": one_of(Risk),
+        "objectives": optional(objectives),
         "stages": items_of(instance_of(Stage), "objects of the class Stage"),
     }
 )

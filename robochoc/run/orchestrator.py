@@ -41,6 +41,7 @@ from robochoc.verification.checker import check_user_cost
 from robochoc.verification.policies import policy_report
 
 if TYPE_CHECKING:
+    from robochoc.run.objectives import CombinedRun
     from robochoc.solver.ace import AceProcess
 
 
@@ -96,12 +97,14 @@ class PreparedRun:
         choice: The options with a protocol and an order, and the reasons for them.
         spent_s: The seconds spent on the choice. They count towards the time of the run.
         uncertain: The team with expected costs, if the problem has random variables.
+        combined: The team with several objectives, if `team` is its form with a single cost.
     """
 
     team: Team
     choice: ProtocolChoice
     spent_s: float
     uncertain: Team | None = None
+    combined: CombinedRun | None = None
 
     def solve(
         self,
@@ -128,7 +131,7 @@ class PreparedRun:
             _check_costs(team, outcome)
         if self.uncertain and outcome.assignment and not outcome.epochs:
             return replace(outcome, uncertainty=policy_report(self.uncertain, outcome, options.risk))
-        return outcome
+        return outcome if self.combined is None else self.combined.outcome(outcome)
 
 
 def prepare(team: Team, options: Options, *, environment: bool = False, ordered: bool = True) -> PreparedRun:
@@ -143,18 +146,26 @@ def prepare(team: Team, options: Options, *, environment: bool = False, ordered:
 
     Raises:
         InvalidInputError: if the team is not valid.
+        UnsupportedError: if the options cannot be combined with the objectives of the team.
     """
     check_team(team)
     uncertain = team if is_uncertain(team) else None
     began = time.monotonic()
     if options.risk == Risk.WORST:
         team = _worst_case(team)
+    run = None
+    if team.objectives or options.objectives is not None:
+        from robochoc.run.objectives import combined_run  # noqa: PLC0415 - start-up: rarely needed
+
+        run = combined_run(team, options, environment=environment)
+        if run is not None:
+            team, options = run.team, run.options
     deadline = None if options.limit_s is None else began + options.limit_s
     try:
         choice = computed_by(deadline, choose, team, options, environment=environment, ordered=ordered)
     except TimeLimitError:
         choice = choose_without_analysis(team, options)
-    return PreparedRun(team, choice, time.monotonic() - began, uncertain)
+    return PreparedRun(team, choice, time.monotonic() - began, uncertain, run)
 
 
 def _worst_case(team: Team) -> Team:

@@ -46,6 +46,7 @@ PURPOSES = {
             traits.counts or any(word in traits.use_when for word in ("counting", "count solutions", "listing"))
         ),
     ),
+    "objectives": Purpose("the Pareto front of several objectives", lambda traits: traits.fronts),
     "tasks": Purpose("auctions and coalitions, for task allocations only", lambda traits: traits.allocates),
     "comparison": Purpose(
         "baselines and predecessors, for studies",

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 from decimal import Decimal
-from typing import assert_never
+from typing import TYPE_CHECKING, assert_never
 
 from robochoc.model.absence import restated
 from robochoc.model.cost_units import Cost, cost_shown
@@ -28,6 +28,9 @@ from robochoc.model.problem import (
 )
 from robochoc.model.team_edits import constraints_in_force
 from robochoc.system.errors import RobochocError
+
+if TYPE_CHECKING:
+    from fractions import Fraction
 
 MAX_TRIES = 20_000
 """The maximum number of values that are tried for the variables of a withdrawn robot."""
@@ -102,22 +105,42 @@ def check_user_cost(team: Team, assignment: Assignment, cost: Cost | None, witho
     places = max(robot.costs.places for robot in team.robots)
     from fractions import Fraction  # noqa: PLC0415 - start-up: many problems have no costs
 
-    total = Fraction(0)
-    absent = {name for name in team.variables if team.owner[name] in without}
-    for robot in team.robots:
-        unit = Fraction(1, 10**robot.costs.places)
-        total += robot.costs.constant * unit
-        for constraint in robot.constraints():
-            in_force = restated(constraint, absent)
-            if in_force is not None:
-                paid = int(constraint_cost(in_force, assignment))
-                definition = constraint.definition
-                total += paid * (Fraction(1, 10**definition.places) if isinstance(definition, Function) else unit)
+    total = sum(_totals(team, assignment, without).values())
     if Fraction(cost) != total:
         exact = Decimal(int(total * 10**places)).scaleb(-places)
         raise RefutedError(
             f"the answer for {team.name} costs {cost_shown(exact)}, but the protocol claims {cost_shown(cost)}"
         )
+
+
+def objective_costs(team: Team, assignment: Assignment, without: Collection[str] = ()) -> dict[str, Cost]:
+    """Return the cost of `assignment` in each objective of `team`, in the user's units. See `check_user_cost`."""
+    functions = (one.definition.places for one in team.constraints() if isinstance(one.definition, Function))
+    places = max([*(robot.costs.places for robot in team.robots), *functions])
+    totals = _totals(team, assignment, without)
+    return {
+        name: Decimal(int(totals[name] * 10**places)).scaleb(-places) if places else int(totals[name])
+        for name in team.objectives
+    }
+
+
+def _totals(team: Team, assignment: Assignment, without: Collection[str]) -> dict[str, Fraction]:
+    """Return the sum of costs for each objective, and for "" the constants and the costs without an objective."""
+    from fractions import Fraction  # noqa: PLC0415 - start-up: many problems have no costs
+
+    totals = dict.fromkeys(("", *team.objectives), Fraction(0))
+    absent = {name for name in team.variables if team.owner[name] in without}
+    for robot in team.robots:
+        unit = Fraction(1, 10**robot.costs.places)
+        totals[""] += robot.costs.constant * unit
+        for constraint in robot.constraints():
+            in_force = restated(constraint, absent)
+            if in_force is not None:
+                paid = int(constraint_cost(in_force, assignment))
+                definition = constraint.definition
+                own = Fraction(1, 10**definition.places) if isinstance(definition, Function) else unit
+                totals[constraint.objective] += paid * own
+    return totals
 
 
 def needlessly_withdrawn(team: Team, assignment: Assignment, withdrawn: Collection[str]) -> Iterator[str]:

@@ -147,6 +147,7 @@ def test_the_list_can_be_of_one_purpose() -> None:
     assert {"dynabt", "s-dpop"} <= listed["change"]
     assert "abt" not in listed["change"]
     assert listed["counting"] == {"count-dpop", "list-dpop", "central"}
+    assert listed["objectives"] == {"mo-dpop"}
     assert listed["tasks"] == {"cbaa", "cbba", "grape", "ssi"}
     assert listed["comparison"] == {"adopt", "afc", "awc", "sbt", "syncbb"}
     working = {name: one for name, one in objects(run("--json")).items() if "broken" not in one}

@@ -230,7 +230,7 @@ def test_of_a_robot_that_nobody_sees_one_value_is_listed() -> None:
 @looped(
     ("places", "why"),
     [
-        ({"RA": [0], "RB": [0, 1]}, "different numbers of optima, from 1 to 2"),
+        ({"RA": [0], "RB": [0, 1]}, "different numbers of assignments, from 1 to 2"),
         ({"RA": [0, 0], "RB": [1, 1]}, "are equal"),
     ],
 )

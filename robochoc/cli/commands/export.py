@@ -9,10 +9,12 @@ import click
 
 from robochoc.cli.options.paths import OutputFile, refuse_same_places
 from robochoc.cli.options.problems import WRITTEN, ProblemPath, reading_options
+from robochoc.cli.options.solve import objectives_option
 from robochoc.cli.reports.failures import USAGE, Failure, errors_as_failures
 
 if TYPE_CHECKING:
     from robochoc.formats.dialects.dialect import ExportOptions, ExportResult
+    from robochoc.model.objectives import ObjectivesMode
     from robochoc.model.problem import Team
 
 
@@ -23,8 +25,17 @@ if TYPE_CHECKING:
 )
 @click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="File to write.  [default: standard output]")
 @click.option("--intension", is_flag=True, help="Keep predicates and functions (frodo only, for its JaCoP parser).")
+@objectives_option
 @reading_options
-def export(folder: Path, kind: str, output: Path | None, intension: bool, **reading: Any) -> None:  # noqa: ANN401, FBT001 - `read_problem`, click's
+def export(
+    folder: Path,
+    *,
+    kind: str,
+    output: Path | None,
+    intension: bool,
+    objectives: ObjectivesMode | None,
+    **reading: Any,  # noqa: ANN401 - the other options
+) -> None:
     """Write the problem of the team in the folder TEAM, all files merged, for other tools.
 
     \b
@@ -39,7 +50,8 @@ def export(folder: Path, kind: str, output: Path | None, intension: bool, **read
     dot         the constraint graph over a pseudo-tree, for Graphviz
     graphml     the constraint graph of the variables, for Gephi and networkx
 
-    TEAM may also be a problem file of another tool. A team that the format
+    Of a team with several objectives, --objectives writes the weighted or
+    lexicographic sum. TEAM may also be a problem file of another tool. A team that the format
     cannot express is an error.
     """  # noqa: D301 - \\b keeps click from wrapping the lines
     from robochoc.system.files import write_atomically
@@ -52,6 +64,10 @@ def export(folder: Path, kind: str, output: Path | None, intension: bool, **read
         from robochoc.formats.problems import read_problem
 
         team = read_problem(folder, **reading).team
+        if objectives is not None:
+            from robochoc.run.objectives import with_single_cost
+
+            team = with_single_cost(team, objectives)
         written = _written(team, kind, ExportOptions(intension=intension))
     if output is None:
         if len(written.files) > 1:

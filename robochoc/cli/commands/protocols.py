@@ -35,8 +35,8 @@ def protocols(name: str | None, *, purpose: str | None, as_json: bool, long: boo
     dynamic       continues when the problem changes (--long)
     privacy       information hidden from neighbours (--long)
 
-    Purposes: satisfaction, costs, optimum, asymmetric, large-teams, privacy, change, lost-messages, counting, tasks,
-    comparison. A protocol can have several.
+    Purposes: satisfaction, costs, optimum, asymmetric, large-teams, privacy, change, lost-messages, counting,
+    objectives, tasks, comparison. A protocol can have several.
 
     \b
     robochoc protocols --for all            the purposes, each with its protocols

@@ -38,6 +38,7 @@ from robochoc.cli.options.solve import (
     filter_option,
     kill_option,
     messages_option,
+    objectives_option,
     options_of,
     preprocess_option,
     protocol_option,
@@ -59,8 +60,8 @@ _SECTIONS: Sections = {
         "--json", "--html", "--journal", "--sniff", "--help",
     ),
     "Search": (
-        "--order", "--set", "--start", "--cold", "--preprocess", "--answer", "--risk", "--no-repair", "--messages",
-        "--ncccs", "--cycles", "--count", "--with", "--cluster",
+        "--order", "--set", "--objectives", "--risk", "--start", "--cold", "--preprocess", "--answer",
+        "--no-repair", "--messages", "--ncccs", "--cycles", "--count", "--with", "--cluster",
     ),
     "Losses of robots (processes and network)": ("--on-loss", "--spare", "--patience", "--kill", "--standby"),
     "Delivery of messages": ("--schedule", "--delay", "--channel", "--message-loss", "--filter"),
@@ -85,10 +86,7 @@ _SECTIONS: Sections = {
     "--order",
     type=ORDER_NAME,
     metavar="NAME|FILE",
-    help=(
-        f"Priority order of the robots: {', '.join(ORDERS)}, or a file with one name per line."
-        "  [default: given; auto chooses]"
-    ),
+    help=(f"Order: {', '.join(ORDERS)}, or a file of names."),
 )
 @click.option(
     "--runtime",
@@ -148,6 +146,7 @@ _SECTIONS: Sections = {
 @answer_option
 @risk_option
 @repair_option
+@objectives_option
 @messages_option
 @click.option(
     "--ncccs",

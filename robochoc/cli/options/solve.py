@@ -20,6 +20,7 @@ from robochoc.cli.options.value_types import NameOrFile, Number, ProtocolName, W
 from robochoc.cli.reports.failures import errors_as_failures
 from robochoc.cli.reports.live_sniffer import SnifferRequest
 from robochoc.communication.kill_schedule import Kill
+from robochoc.model.objectives import ObjectivesMode, objectives_mode
 from robochoc.run.defaults import AUTO, MOST_STANDBYS
 from robochoc.system.lazy_dataclass import dataclass
 
@@ -64,7 +65,7 @@ withdraw_option = click.option(
     "--withdraw",
     type=WithdrawalName(),
     metavar="[=KIND]",
-    help=("If there is no solution, withdraw robots. minimum (default): least weight, proven; maximal: fast."),
+    help=("If there is no solution, withdraw robots: minimum (default) or maximal (fast)."),
 )
 deadline_option = click.option(
     "--deadline",
@@ -120,6 +121,27 @@ messages_option = click.option(
 )
 
 
+class ObjectivesType(click.ParamType[ObjectivesMode]):
+    """A way to combine several objectives: `weighted:NAME=WEIGHT,...`, `lexicographic:NAME,...` or `pareto`."""
+
+    name = "objectives"
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> ObjectivesMode:
+        """Return the mode in the value."""
+        try:
+            return objectives_mode(value)
+        except ValueError as invalid:
+            self.fail(str(invalid), param, ctx)
+
+
+objectives_option = click.option(
+    "--objectives",
+    type=ObjectivesType(),
+    metavar="MODE",
+    help="pareto (default), weighted:A=1,B=3, lexicographic:A,B.",
+)
+
+
 class KillType(click.ParamType[Kill]):
     """A value `ROBOT@SECONDS`."""
 
@@ -161,7 +183,7 @@ filter_option = click.option(
 _SAME_NAMES = (
     "seed", "timeout", "delay", "count", "verify", "messages", "ncccs", "cycles", "spares", "patience", "filters",
     "kill", "standby", "bounds", "message_loss", "deadline", "improve", "runtime", "schedule", "withdraw", "on_loss",
-    "preprocess", "central_with", "cluster", "answer", "risk", "cold", "repair",
+    "preprocess", "central_with", "cluster", "answer", "risk", "cold", "repair", "objectives",
 )  # fmt: skip
 """The arguments of `robochoc solve` that have the same name in `robochoc.run.Options`."""
 

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 WIDTH = 100
 _LARGE = 1 << 16
 """The size in bytes from which a message is mentioned."""
+_MOST_POINTS = 30
+"""The maximum number of points of a Pareto front listed in a report."""
 _MOST_DROPPED = 3
 """The maximum number of dropped constraints listed in a report."""
 _CELL = re.compile(r"[A-Za-z_]+([0-9]+)[._]([0-9]+)")
@@ -44,7 +46,7 @@ def outcome_report(team: Team, outcome: Outcome, ground: GroundMap | None = None
     places = MapPlaces(team, ground)
     if outcome.assignment:
         lines += _values(team, outcome.labelled(outcome.assignment), places.places_of(outcome.assignment))
-    lines += [*_listed(team, outcome, places), *_uncertainty(outcome)]
+    lines += [*_front(outcome), *_listed(team, outcome, places), *_uncertainty(outcome)]
     if outcome.withdrawn_alive:
         lines += [
             f"  {len(outcome.withdrawn_alive)} withdrawn{_weight(team, outcome)}:",
@@ -70,6 +72,21 @@ def _uncertainty(outcome: Outcome) -> list[str]:
         case = ", ".join(f"{shortened(name)} = {value}" for name, value in report.worst_scenario.items())
         worst = f"{cost_shown(report.worst)} ({case or 'the same'}), of {scenarios}"
     return [f"  expected cost {cost_shown(report.expected)}; worst case {worst}"]
+
+
+def _front(outcome: Outcome) -> list[str]:
+    """Return a table of the points of the Pareto front; the first one has the values above."""
+    if not outcome.front:
+        return []
+    names = (*outcome.front[0].objectives,)
+    rows = [
+        (str(number), *map(_number, point.objectives.values()))
+        for number, point in enumerate(outcome.front[:_MOST_POINTS], 1)
+    ]
+    more = len(outcome.front) - len(rows)
+    rest = [f"and {counted(more, 'more point')} (--json lists all, with their values)"] if more else []
+    table = table_lines(("point", *names), rows, right=("point", *names))
+    return [f"  {line}" for line in (*table, *rest)]
 
 
 def _dropped(outcome: Outcome) -> list[str]:

@@ -11,8 +11,8 @@ from tests.support.random_outcomes import NAMES, VARIABLES, random_outcome
 TEXTS = {"team", "protocol", "runtime", "reason", "order", "channel", "placed_by", "chosen", "name", "confirmed_by"}
 TEXTS |= {"solved_by", "stages", "repair", "led_by", "value"}
 """Fields whose texts are not names of robots and variables."""
-COUNTED = {"messages", "symbols"}
-"""Fields whose keys are types of messages, or names of symbols."""
+COUNTED = {"messages", "symbols", "objectives"}
+"""Fields whose keys are types of messages, or names of symbols or objectives."""
 
 
 def names_in(found: object) -> set[str]:
