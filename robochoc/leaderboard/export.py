@@ -74,5 +74,5 @@ def export_instance(instance: Instance, kind: str, output: Path | None, *, repla
     for one, (_, content) in zip(paths, contents, strict=True):
         write_atomically(one, content)
         yield f"{one}: {len(content):,} bytes"
-    for note, text in (*written.notes, *notes_on_features(team)):
+    for note, text in (*written.notes, *notes_on_features(team, dialect)):
         yield f"  {note}: {text}"

@@ -10,8 +10,8 @@ import pytest
 import robochoc
 from robochoc.communication.kill_schedule import Kill
 from robochoc.formats import read_team
-from robochoc.formats.dialects.dialect import ImportOptions
-from robochoc.formats.dialects.registry import read_foreign
+from robochoc.formats.dialects.dialect import ExportOptions, ImportOptions, can_state_random_variables
+from robochoc.formats.dialects.registry import find_dialect, read_foreign
 from robochoc.model.outcome import Verdict
 from robochoc.model.policies import Risk
 from robochoc.model.uncertainty import is_uncertain
@@ -105,3 +105,20 @@ def test_the_others_continue_without_a_lost_robot() -> None:
     outcome = solve(team, options)
     assert outcome.lost == ("Camera",)
     assert outcome.assignment.keys() == {"relay.wind.0", "relay.wind.3"}
+
+
+def test_exported_to_frodo_and_imported_again_costs_the_same(tmp_path: Path) -> None:
+    chance = drawn("uncertainty to FRODO")
+    frodo = find_dialect("frodo")
+    assert frodo is not None
+    assert frodo.write is not None
+    for number in range(12):
+        problem = uncertain_problem(chance, observed=number % 3 == 0)
+        file = tmp_path / f"{number}.xml"
+        file.write_bytes(frodo.write(problem.team, ExportOptions()).files["uncertain.xml"])
+        again = read_foreign([file], ImportOptions()).team
+        assert is_uncertain(again) == can_state_random_variables(problem.team)
+        first, second = (solve(one, SIMULATED) for one in (problem.team, again))
+        assert first.cost == second.cost
+        if is_uncertain(again) and first.uncertainty and second.uncertainty:
+            assert first.uncertainty.scenarios == second.uncertainty.scenarios

@@ -95,7 +95,7 @@ def _written(team: Team, kind: str, options: ExportOptions) -> ExportResult:
         raise Failure(USAGE, f"this version cannot write {kind}")
     refuse_several_objectives(team)
     written = dialect.write(team, options)
-    return written._replace(notes=(*written.notes, *notes_on_features(team)))
+    return written._replace(notes=(*written.notes, *notes_on_features(team, dialect)))
 
 
 def _ending(team: Team, name: str) -> str:

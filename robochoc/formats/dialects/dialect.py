@@ -12,7 +12,7 @@ from typing import NamedTuple
 from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.formats.names import MAX_NAME, RESERVED, is_name
 from robochoc.model.problem import Team
-from robochoc.model.uncertainty import is_uncertain
+from robochoc.model.uncertainty import is_uncertain, random_variables
 from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.plain_text import counted
 
@@ -110,6 +110,7 @@ class Dialect:
             the format is only read.
         is_part: Returns whether a file is one of several files of a problem, from its path and its first bytes; such
             files of a folder are read together. None: a problem is one file.
+        writes_random: True if files can contain random variables that no variable observes.
     """
 
     name: str
@@ -118,6 +119,7 @@ class Dialect:
     read: Callable[[Sequence[Path], ImportOptions], ImportResult]
     write: Callable[[Team, ExportOptions], ExportResult] | None = None
     is_part: Callable[[Path, bytes], bool] | None = None
+    writes_random: bool = False
 
 
 class NameMap:
@@ -179,10 +181,15 @@ def notes_on_names(changed: Collection[tuple[str, str]]) -> list[ConversionNote]
     return [ConversionNote("renamed", f"{original} is {name}") for name, original in changed]
 
 
-def notes_on_features(team: Team) -> list[ConversionNote]:
-    """Return notes on features of `team` that no exported format supports: `when_absent`, and random variables."""
+def can_state_random_variables(team: Team) -> bool:
+    """Return whether `team` has random variables, and no variable that is chosen after an observation."""
+    return is_uncertain(team) and not any(one.seen_by for one in random_variables(team))
+
+
+def notes_on_features(team: Team, dialect: Dialect) -> list[ConversionNote]:
+    """Return notes on features of `team` that are lost in the files of `dialect`."""
     random = [ConversionNote("random", "costs are expected costs, without random variables")]
-    found = random if is_uncertain(team) else []
+    found = random if is_uncertain(team) and not (dialect.writes_random and can_state_random_variables(team)) else []
     first, *more = [*dict.fromkeys(one.name for one in team.constraints() if one.when_absent is not None), ""]
     others = f" and {counted(len(more) - 1, 'other constraint')}" if len(more) > 1 else ""
     if first:

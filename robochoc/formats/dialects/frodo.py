@@ -25,6 +25,7 @@ from robochoc.formats.dialects.dialect import (
     ExportResult,
     ImportOptions,
     ImportResult,
+    can_state_random_variables,
 )
 from robochoc.formats.dialects.exact_costs import Amount, Scale
 from robochoc.formats.dialects.tabulation import (
@@ -49,9 +50,10 @@ from robochoc.formats.dialects.xcsp21.reader import PUBLIC, FileHead, read_insta
 from robochoc.formats.dialects.xcsp21.team import to_team
 from robochoc.formats.element_view import ElementView
 from robochoc.formats.global_constraints import PREFIX, write_global
-from robochoc.model.constraint import INFINITE, Function, GlobalPredicate, Predicate, Relation
+from robochoc.model.constraint import INFINITE, Domain, Function, GlobalPredicate, Predicate, Relation, Variable
 from robochoc.model.expression import Apply, Constant, Expression
-from robochoc.model.problem import Team
+from robochoc.model.problem import RandomVariable, Robot, Team
+from robochoc.model.uncertainty import declared_robots, random_variables
 from robochoc.solver.errors import UnsupportedError
 from robochoc.system.plain_text import counted
 
@@ -62,6 +64,8 @@ KEEPS_FORMULAS = "--intension writes it as a predicate or function, for FRODO's 
 LIMIT = 2**31 - 1
 """The integer that FRODO, whose costs have 32 bits, treats as infinity."""
 
+_CHANCE = ""
+"""The owner of random variables: no agent."""
 _SELF = re.compile(rb"<agents\s[^>]*\bself\s*=")
 _TERM = r"(?:X\d+|-?\d+)"
 _FORMS = {
@@ -207,13 +211,25 @@ def _write(team: Team, options: ExportOptions) -> ExportResult:
     Raises:
         UnsupportedError: if FRODO lacks a feature of the team.
     """
-    writer = _FrodoWriter(FlatTeam(team, TITLE), intension=options.intension)
+    random = random_variables(team) if can_state_random_variables(team) else ()
+    writer = _FrodoWriter(FlatTeam(_declared(team, random), TITLE), random, intension=options.intension)
     return ExportResult({f"{team.name}.xml": writer.content()}, tuple(writer.notes()))
 
 
+def _declared(team: Team, random: Sequence[RandomVariable]) -> Team:
+    """Return the team with its `random` variables, which an additional robot owns."""
+    if not random:
+        return team
+    domains = (Domain(one.name, tuple(range(value, value + 1) for value in sorted(one.outcomes))) for one in random)
+    variables = tuple(Variable(one.name, domain) for one, domain in zip(random, domains, strict=True))
+    chance = Robot(_CHANCE, variables, kind=team.kind)
+    return replace(team, robots=(*declared_robots(team.robots), chance))
+
+
 class _FrodoWriter:
-    def __init__(self, flat: FlatTeam, *, intension: bool) -> None:
+    def __init__(self, flat: FlatTeam, random: Sequence[RandomVariable], *, intension: bool) -> None:
         self._flat = flat
+        self._random = random
         hint = "" if intension else f" ({KEEPS_FORMULAS})"
         self._contents = [(intension and self._in_intension(one)) or flat.table(one, hint) for one in flat.owned]
         tables = [content for content in self._contents if isinstance(content, TabulatedConstraint)]
@@ -236,10 +252,12 @@ class _FrodoWriter:
         if self._places:
             etree.SubElement(document.presentation, "stats", name=UNIT).text = self._unit
         for robot in flat.team.robots:
-            etree.SubElement(document.agents, "agent", name=robot.name)
+            owner = {"type": "random"} if robot.name == _CHANCE else {"agent": robot.name}
+            if robot.name != _CHANCE:
+                etree.SubElement(document.agents, "agent", name=robot.name)
             for variable in robot.variables:
                 domain = flat.domain_of[variable.name]
-                etree.SubElement(document.variables, "variable", name=variable.name, domain=domain, agent=robot.name)
+                etree.SubElement(document.variables, "variable", {"name": variable.name, "domain": domain, **owner})
         for one, content in zip(flat.owned, self._contents, strict=True):
             if isinstance(content, TabulatedConstraint):
                 self._add(content)
@@ -247,7 +265,19 @@ class _FrodoWriter:
                 self._add_formula(one, content)
         if flat.constant:
             self._add(constant_table(flat.team, flat.constant))
+        if self._random:
+            self._add_probabilities()
         return document.content()
+
+    def _add_probabilities(self) -> None:
+        section = etree.Element("probabilities")
+        self._document.constraints.addprevious(section)
+        for one in self._random:
+            law = f"P.{one.name}"
+            sizes = {"arity": "1", "nbTuples": str(len(one.outcomes)), "semantics": "soft"}
+            element = etree.SubElement(section, "probability", {"name": law, **sizes})
+            element.text = " | ".join(f"{decimal(chance)}: {value}" for value, chance in one.probabilities.items())
+            self._document.constraint(f"Law.{one.name}", (one.name,), law)
 
     def notes(self) -> Iterator[ConversionNote]:
         """Yield the differences between the file and the team."""
@@ -336,4 +366,4 @@ def _is_known_form(predicate: GlobalPredicate) -> bool:
     return _FORMS[predicate.name.removeprefix(PREFIX)].fullmatch(predicate.form) is not None
 
 
-DIALECT = Dialect(NAME, TITLE, _recognises, _read, _write, is_part=_is_part)
+DIALECT = Dialect(NAME, TITLE, _recognises, _read, _write, is_part=_is_part, writes_random=True)
