@@ -154,13 +154,14 @@ class Deployment(ABC):
         """Return whether `answer`, from the protocol of `phase`, is to be repaired: see `run/phases.py`.
 
         There is no repair in runs with limits on messages, checks or cycles, of final assignments (if the options ask
-        for these), of large teams, and of runs in stages.
+        for these), of large teams, of runs in stages, and of protocols with secret keys: it would disclose secrets.
         """
         options = self.options
         wanted = options.repair and options.answer == AnswerRule.BEST and not options.stages
         limited = (options.messages, options.ncccs, options.cycles) != (None, None, None)
         over = self.left_s() == 0 or stop_requested()
         found = answer.ended and 0 < len(answer.nearest) <= MOST_REPAIRED and not phase.traits.complete
+        found = found and not phase.traits.secret_keys
         return wanted and found and not (limited or over) and self.can_repair(phase)
 
     def can_repair(self, phase: RunPhase) -> bool:

@@ -42,6 +42,8 @@ PART, POSITIVE_PART = "it must be from 0 to 1", "it must be more than 0 and at m
     ("p2-dpop", "ciphers", "0 1000001", "ciphers is .*from 1 to 1,000,000"),
     ("p2-dpop", "spare", "-1 1001", "spare is"),
     ("p32-dpop", "spare", "-1 1001", "spare is"),
+    ("p-dsa", "cycles", "0 100001", "cycles is .*from 1 to 100,000"),
+    ("p-dsa", "probability", "0 1.1 nan", "more than 0 and at most 1"),
     ("pc-syncbb", "bits", "30 5 8192", "bits is .*one of 31, 61"),
     ("pc-syncbb", "comparisons", "0 10000001", "comparisons is .*from 1 to 10,000,000"),
     ("pc-syncbb", "search", "closed", "search"),

@@ -39,6 +39,7 @@ MOST_TELLING = {
     "mixed-dsa": (("odd", ScheduleName.CONCURRENT), ("queens3d-3-full", ScheduleName.RANDOM)),
     "ncbb": (("odd", ScheduleName.CONCURRENT), ("patrol", ScheduleName.RANDOM)),
     "p2-dpop": (("queens3d-2", ScheduleName.CONCURRENT), ("odd", ScheduleName.RANDOM)),
+    "p-dsa": (("prices", ScheduleName.CONCURRENT), ("prices", ScheduleName.RANDOM)),
     "pc-syncbb": (("prices", ScheduleName.CONCURRENT), ("prices", ScheduleName.RANDOM)),
     "sfb": (("odd", ScheduleName.CONCURRENT), ("patrol", ScheduleName.RANDOM)),
 }
@@ -93,7 +94,8 @@ def journal(team: Team, protocol: str, schedule: ScheduleName) -> bytes:
     """
     withdraw = None if team.dynamic or team.kind is ProblemKind.DISWCSP else Withdrawal.MAXIMAL
     known = protocol_named(protocol).settings
-    small = {"cycles": "3", "samples": "3", "bits": "31"}
+    known_bits = hasattr(known, "bits")
+    small = {"cycles": "1" if known_bits else "3", "samples": "3", "bits": "31"}
     settings = {name: value for name, value in small.items() if hasattr(known, name)}
     options = Options(
         protocol=protocol,

@@ -33,7 +33,8 @@ With `hidden`, the number of comparisons is the number of combinations of values
 The methods:
 
     shares          `shamir`                  products, random numbers   `shared_arithmetic`
-    comparison      `shared_comparison`       search                     `_visit_next`, `_add_costs`, `_use_answer`
+    comparison      `shared_comparison`       costs                      `shared_costs`
+    search          `_visit_next`, `_add_costs`, `_use_answer`
 
 Choices that the paper leaves open, and differences:
 
@@ -54,35 +55,22 @@ Choices that the paper leaves open, and differences:
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from enum import StrEnum
 from itertools import islice
 from typing import Any, ClassVar
 
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import INFINITE
-from robochoc.protocols import acts
 from robochoc.protocols.key_stream import shuffled
-from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.private.linear_order import own_costs, own_places
-from robochoc.protocols.private.shamir import FIELD_BITS, Field, field_of
 from robochoc.protocols.private.shared_arithmetic import (
     Inputs,
     Output,
     SharedArithmeticMessage,
-    SharedArithmeticProtocol,
 )
+from robochoc.protocols.private.shared_costs import SharedCostsProtocol, Sizes, check_settings
 from robochoc.protocols.settings import Settings
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
-from robochoc.protocols.wording import Wording
-from robochoc.solver.errors import TooLargeError
 from robochoc.solver.local_problem import LocalProblem
-from robochoc.system.plain_text import counted, listed
-
-MOST_COMPARISONS = 10_000_000
-MOST_VALUES = 10_000
-_LEAST_BITS = 31
 
 
 class Search(StrEnum):
@@ -100,31 +88,10 @@ class PCSyncBBSettings(Settings, frozen=True):
     bits: int = 61
 
     def __post_init__(self) -> None:
-        if not 1 <= self.comparisons <= MOST_COMPARISONS:
-            raise ValueError(f"comparisons is {self.comparisons}; it must be from 1 to {MOST_COMPARISONS:,}")
-        allowed = [bits for bits in FIELD_BITS if bits >= _LEAST_BITS]
-        if self.bits not in allowed:
-            raise ValueError(f"bits is {self.bits}; it must be one of {', '.join(map(str, allowed))}")
+        check_settings(self.comparisons, self.bits)
 
 
-class Sizes(Message, frozen=True):
-    """The number of the sender's declared values, and its constraints with two or more robots before it: their names.
-
-    All robots need the latter to compute with the codes of these robots' values together.
-    """
-
-    values: int
-    scopes: list[tuple[str, ...]]
-
-    act = acts.TELL_DOMAIN
-    proves_nothing = True  # the files declare it; names of robots are not measured
-
-    def in_words(self, _: Wording) -> str:
-        wide = "".join(f"; I share a constraint with {listed(scope)}" for scope in self.scopes)
-        return f"I have {counted(self.values, 'declared value')}{wide}"
-
-
-class PCSyncBB(SharedArithmeticProtocol):
+class PCSyncBB(SharedCostsProtocol):
     """One agent of PC-SyncBB.
 
     Public state, the same for all robots: `sizes`, the number of values of each robot; `attempts`, the number of values
@@ -149,7 +116,6 @@ class PCSyncBB(SharedArithmeticProtocol):
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
-        self.sizes: list[int] = []
         self.attempts: list[int] = []
         self.found = False
         self.current = 0
@@ -157,15 +123,7 @@ class PCSyncBB(SharedArithmeticProtocol):
         self.codes: list[list[int]] = []
         self.paid: list[int] = []
         self.bound = 0
-        self._places: dict[int, int] = {}
         self._order: list[int] = []
-        self._alone: list[int] = []
-        self._rows: dict[tuple[str, ...], list[list[int]]] = {}
-        """For one robot before this one, and each own declared value: the costs with each of its declared values."""
-        self._wide_rows: dict[tuple[str, ...], list[list[int]]] = {}
-        """The same for several robots, in the order of ranks; the values of the last one change fastest."""
-        self._scopes: list[list[list[int]]] = []
-        """For each robot, the ranks of the robots in each scope that it has announced."""
         self._joint: list[list[list[int]]] = []
         """For each robot on the path and each of its announced scopes: shares of the joint code of the robots in it."""
         self._joined = 1
@@ -176,117 +134,21 @@ class PCSyncBB(SharedArithmeticProtocol):
         self._hidden_found = 0
 
     @property
-    def field(self) -> Field:
-        return field_of(self.settings.bits)
-
-    @property
-    def broken(self) -> int:
-        """The cost of a broken hard constraint, above all sums of finite costs."""
-        return 1 << 2 * self.field.bits // 3
+    def limits(self) -> tuple[int, int]:
+        return self.settings.comparisons, self.settings.bits
 
     @property
     def is_hidden(self) -> bool:
         """True if the answers of comparisons are not opened."""
         return self.settings.search == Search.HIDDEN
 
-    def start(self) -> None:
-        """Send the number of values; a robot alone decides."""
-        self._places = own_places(self.problem)
-        if not self.others:
-            self._decide_alone()
-            return
-        self._compute_costs()
-        size = self.problem.declared_count(self.problem.agent)
-        if size > MOST_VALUES:
-            raise TooLargeError(f"{self.problem.agent} has {size:,} values, more than {MOST_VALUES:,}")
-        for name in self.others:
-            self.send(name, Sizes(size, [*self._wide_rows]))
-        self.wait_for(Sizes, self.others, "_use_sizes")
-        self.proceed()
-
-    def _decide_alone(self) -> None:
-        costs = own_costs(self.problem)
-        if not len(costs) or costs.min() == INFINITE:
-            self.conclude(Verdict.NO_SOLUTION)
-        else:
-            self.value = int(costs.argmin())
-
-    def _compute_costs(self) -> None:
-        """Compute the costs of each declared value, alone and with each declared value of robots before this one."""
-        problem, size = self.problem, self.problem.declared_count(self.problem.agent)
-        self._check_sums()
-        alone = own_costs(problem)
-        self._alone = [
-            self._number(alone[self._places[one]]) if one in self._places else self.broken for one in range(size)
-        ]
-        ranks = self.order.rank
-        above = [name for name in problem.neighbours if ranks[name] < self.rank]
-        for table in problem.tables({name: problem.declared(name) for name in above}):
-            if not table.agents:
-                continue
-            agents = sorted(table.agents, key=ranks.__getitem__)
-            costs = (
-                table.joined()
-                .transpose([*map(table.agents.index, agents), len(agents)])
-                .reshape(-1, len(problem.values))
-            )
-            rows = self._rows if len(agents) == 1 else self._wide_rows
-            known = rows.setdefault(tuple(agents), [[0] * len(costs) for _ in range(size)])
-            for place, index in self._places.items():
-                column = map(self._number, costs[:, index])
-                known[place] = [one + two for one, two in zip(known[place], column, strict=True)]
-
-    def _number(self, cost: float) -> int:
-        return self.broken if cost == INFINITE else int(cost)
-
-    def _check_sums(self) -> None:
-        """Raise `TooLargeError` if costs may add up to as much as a broken constraint, or these to half the field."""
-        scopes = self.problem.scopes(self.order.names)
-        dearest = max((cost for cost in self.problem.charges if cost < INFINITE), default=0)
-        robots = len(self.order.names)
-        if (dearest + sum(most for _, most in scopes)) * robots >= self.broken:
-            raise TooLargeError(
-                f"costs may add up to {self.broken:,}, too much for a field of {self.settings.bits} bits: use smaller"
-                " costs, or a larger field (--set bits=N)"
-            )
-        if (len(scopes) + 2) * robots * self.broken >= self.field.prime // 2:
-            raise TooLargeError(
-                f"too many constraints for a field of {self.settings.bits} bits: use a larger field (--set bits=N)"
-            )
-
-    def _use_sizes(self) -> None:
-        received = [message for message in self.received() if isinstance(message, Sizes)]
-        received.insert(self.rank, Sizes(self.problem.declared_count(self.problem.agent), [*self._wide_rows]))
-        self.sizes = [message.values for message in received]
-        if not all(0 < size <= MOST_VALUES for size in self.sizes):
-            raise ValueError("received an invalid number of values")
-        self._scopes = [self._ranks_of(rank, message.scopes) for rank, message in enumerate(received)]
-        for names, rows in self._rows.items():
-            if len(rows[0]) != self.sizes[self.order.rank[names[0]]]:
-                raise ValueError(f"{names[0]} sent another number of values than its file declares")
+    def begin(self) -> None:
         if self.is_hidden:
-            self._check_comparisons(math.prod(self.sizes))
+            self.check_comparisons(math.prod(self.sizes))
         self.bound = self.broken
         self._hidden_best = [0] * len(self.sizes)
         self.attempts = [0]
         self._visit_next()
-
-    def _ranks_of(self, rank: int, scopes: Sequence[Sequence[str]]) -> list[list[int]]:
-        """Return the ranks of the robots in announced scopes. Raises `ValueError` for impossible scopes."""
-        found = [[self.order.rank.get(name, rank) for name in names] for names in scopes]
-        for ranks in found:
-            if len(ranks) < 2 or ranks != sorted({*ranks}) or ranks[-1] >= rank:  # noqa: PLR2004 - several robots
-                raise ValueError("received the names of a constraint that is not shared with several robots before")
-            if math.prod(self.sizes[one] for one in ranks) > MOST_VALUES:
-                raise TooLargeError(f"the robots of a constraint have more than {MOST_VALUES:,} combinations of values")
-        return found
-
-    def _check_comparisons(self, number: int) -> None:
-        if number > self.settings.comparisons:
-            raise TooLargeError(
-                f"the search needs {number:,} comparisons or more, above the limit of {self.settings.comparisons:,}"
-                " (--set comparisons=N raises the limit)"
-            )
 
     # The search: the same steps for all robots
 
@@ -301,7 +163,7 @@ class PCSyncBB(SharedArithmeticProtocol):
         del self.codes[place:], self.paid[place:], self._hidden_current[place:], self._joint[place + 1 :]
         self.attempts[-1] += 1
         if self.attempts[-1] == 1:
-            self._joint[place:] = [[self.codes[ranks[0]] for ranks in self._scopes[place]]]
+            self._joint[place:] = [[self.codes[ranks[0]] for ranks in self.scopes[place]]]
             self._joined = 1
             self._join_codes()
         else:
@@ -322,7 +184,7 @@ class PCSyncBB(SharedArithmeticProtocol):
 
     def _to_be_joined(self) -> list[tuple[int, int]]:
         """Return the numbers of scopes with further robots, each with the rank of its next robot."""
-        scopes = enumerate(self._scopes[len(self.attempts) - 1])
+        scopes = enumerate(self.scopes[len(self.attempts) - 1])
         return [(number, ranks[self._joined]) for number, ranks in scopes if len(ranks) > self._joined]
 
     def _use_joined(self) -> None:
@@ -346,11 +208,11 @@ class PCSyncBB(SharedArithmeticProtocol):
             places = range(self.sizes[self.rank])
             self._order = [*places] if self.is_hidden else shuffled(places, self.secret)
         self.current = one = self._order[self.attempts[-1] - 1]
-        inputs = [self._alone[one], one]
+        inputs = [self.alone[one], one]
         for name, size in zip(self.order.names[: self.rank], self.sizes, strict=False):
-            rows = self._rows.get((name,))
+            rows = self.rows.get((name,))
             inputs += rows[one] if rows else [0] * size
-        for wide in self._wide_rows.values():
+        for wide in self.wide_rows.values():
             inputs += wide[one]
         inputs += [int(place == one) for place in range(self.sizes[self.rank])]
         self._path_costs = self.share(inputs)
@@ -376,7 +238,7 @@ class PCSyncBB(SharedArithmeticProtocol):
         if self.is_hidden and len(self.attempts) < len(self.sizes):
             self._extend()
             return
-        self._check_comparisons(self.comparisons + 1)
+        self.check_comparisons(self.comparisons + 1)
         self.compare([self.paid[-1] - self.bound], "_use_answer")
 
     def _extend(self) -> None:
@@ -439,7 +301,7 @@ class PCSyncBB(SharedArithmeticProtocol):
     def _decide(self) -> None:
         if not self.found or self.best is None:
             self.conclude(Verdict.NO_SOLUTION)
-        elif self.best not in self._places:
+        elif self.best not in self.places:
             raise ValueError(f"the best path has an impossible value of {self.problem.agent}")
         else:
-            self.value = self._places[self.best]
+            self.value = self.places[self.best]

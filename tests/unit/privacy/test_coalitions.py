@@ -10,6 +10,7 @@ import pytest
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.privacy import PrivacyError, coalition_report
 from robochoc.privacy.coalitions import CoalitionReport
+from robochoc.protocols.private.p_dsa import PDSA, PDSASettings
 from robochoc.protocols.private.pc_syncbb import PCSyncBB, PCSyncBBSettings, Search
 from robochoc.protocols.private.shamir import Field, field_of
 from robochoc.protocols.protocol import Protocol
@@ -28,7 +29,25 @@ class HiddenSearch(PCSyncBB):
 
     @property
     def field(self) -> Field:
-        return field_of(13)
+        return field_of(19)
+
+
+class LargeField(HiddenSearch):
+    """A hidden search of larger teams."""
+
+    @property
+    def field(self) -> Field:
+        return field_of(31)
+
+
+class SmallField(PDSA):
+    """A private local search in a small field."""
+
+    settings = PDSASettings(probability=1, cycles=2)
+
+    @property
+    def field(self) -> Field:
+        return field_of(19)
 
 
 def measured(team: Team, protocol: str | type[Protocol], size: int = 1, *, coins: int = 1) -> CoalitionReport:
@@ -92,6 +111,13 @@ def test_a_hidden_search_discloses_nothing_to_minorities(number: int) -> None:
         assert [one.excluded_by_messages for one in report.losses] == [0] * len(report.losses)
 
 
+@count("number", fast=1, slow=50)
+def test_a_private_local_search_discloses_nothing_to_minorities(number: int) -> None:
+    for seed in range(number):
+        report = measured(random_costs(drawn(f"local {seed}")), SmallField)
+        assert [one.excluded_by_messages for one in report.losses] == [0] * len(report.losses)
+
+
 @pytest.mark.slow
 def test_neither_to_two_of_five() -> None:
     chance = drawn("two of five")
@@ -99,7 +125,7 @@ def test_neither_to_two_of_five() -> None:
     for _ in range(2):
         pairs = [priced(one, two, {row: chance.randrange(2) for row in rows}) for one, two in ("AB", "BC", "CD")]
         team = with_costs(team_of(dict.fromkeys("ABCDE", (1, 2)), pairs))
-        for one in measured(team, HiddenSearch, 2).losses:
+        for one in measured(team, LargeField, 2).losses:
             assert one.excluded_by_messages == 0
 
 

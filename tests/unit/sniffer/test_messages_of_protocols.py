@@ -92,7 +92,7 @@ def other_settings(protocol: type[Protocol]) -> dict[str, str]:
         return {"phases": "2"}
     if hasattr(protocol.settings, "heuristic"):
         return {"heuristic": "dp"}
-    if hasattr(protocol.settings, "comparisons"):
+    if hasattr(protocol.settings, "search"):
         return {"search": "hidden"}
     anytime = {kind.__name__ for kind in get_args(AnytimeMessage)}
     return {"anytime": "yes", "cycles": "4"} if anytime <= {kind.__name__ for kind in types_of(protocol)} else {}

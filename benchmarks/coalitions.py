@@ -1,0 +1,119 @@
+"""Measure protocols that are private against coalitions, for the tables in docs/guides/privacy.md.
+
+    python benchmarks/coalitions.py [PROBLEMS]
+
+First the messages, bytes and CPU time of a comparison in PC-SyncBB, and the number of comparisons in an open search (5
+values, density .3, costs up to 10), which is counted on known costs, since some searches would take hours; then whole
+runs of P-DSA. The last table is the mean share of tables that single robots of three can exclude (2 values, costs of 0
+and 1).
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from random import Random
+from statistics import mean, median
+
+from robochoc.communication.simulator.schedule import Concurrent
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.generators.random_csp import random_csp
+from robochoc.model.problem import Team
+from robochoc.privacy import CoalitionLoss, coalition_report
+from robochoc.protocols.private.p_dsa import PDSA
+from robochoc.protocols.private.pc_syncbb import PCSyncBB
+from robochoc.run.registry import protocol_named
+from robochoc.solver.agent_problem import RunParameters
+
+PROBLEMS = 20
+VALUES = 5
+ROBOTS = (5, 7, 10)
+MESSAGES = 20_000
+EXCLUDING = ("syncbb", "afb", "adopt", "dpop", "o-dpop", "mgm", "dsa", "maxsum", "pc-syncbb", "p-dsa")
+SETTINGS = {"mgm": {"cycles": "5"}, "dsa": {"cycles": "5"}, "maxsum": {"cycles": "5"}, "p-dsa": {"cycles": "2"}}
+
+
+def problem(robots: int, seed: int) -> Team:
+    """Return a random team with costs."""
+    return random_csp(robots, VALUES, 0.3, 0, seed=seed, max_cost=10)
+
+
+def comparisons(team: Team, seed: int) -> int:
+    """Return the number of comparisons in an open search, in which robots try their values in a random order."""
+    chance, count, least = Random(seed), 0, float("inf")
+    names = [variable for robot in team.robots for variable in robot.variables]
+    path: dict[str, int] = {}
+    above = [[one for one in team.constraints() if one.variables[-1] == variable.name] for variable in names]
+
+    def visit(place: int, paid: float) -> None:
+        nonlocal count, least
+        values = [*names[place].domain]
+        chance.shuffle(values)
+        for value in values:
+            path[names[place].name] = value
+            cost = paid + sum(one.price(path) for one in above[place])
+            count += 1
+            if cost < least and place + 1 == len(names):
+                least = cost
+            elif cost < least:
+                visit(place + 1, cost)
+
+    visit(0, 0)
+    return count
+
+
+def print_costs(problems: int) -> None:
+    """Print the costs of PC-SyncBB and of P-DSA."""
+    print("| robots | messages | bytes | CPU ms | comparisons, median of an open search |\n|" + " ---: |" * 5)
+    for robots in ROBOTS:
+        with Simulation(problem(robots, 0), PCSyncBB, Concurrent(seed=0)) as simulation:
+            began = time.process_time()
+            metrics = simulation.search(messages=MESSAGES).metrics
+            spent = time.process_time() - began
+        count = metrics.messages["Result"] / (robots - 1)
+        numbers = (
+            f"{sum(metrics.messages.values()) / count:.0f} | {metrics.bytes / count:,.0f} | {1000 * spent / count:.0f}"
+        )
+        searched = median(comparisons(problem(robots, seed), seed) for seed in range(problems))
+        print(f"| {robots} | {numbers} | {searched:,.0f} |", flush=True)
+    print("\n| robots | messages | MB | CPU s |\n|" + " ---: |" * 4)
+    for robots in ROBOTS:
+        with Simulation(problem(robots, 0), PDSA, Concurrent(seed=0)) as simulation:
+            began = time.process_time()
+            metrics = simulation.search().metrics
+            spent = time.process_time() - began
+        print(
+            f"| {robots} | {sum(metrics.messages.values()):,} | {metrics.bytes / 1e6:.1f} | {spent:.0f} |", flush=True
+        )
+
+
+def print_losses(problems: int) -> None:
+    """Print the shares of tables that coalitions of one robot of three can exclude."""
+    print("\n| protocol | by own values | by messages |\n| --- | ---: | ---: |")
+    for name, settings in [(name, SETTINGS.get(name, {})) for name in EXCLUDING] + [
+        ("pc-syncbb", {"search": "hidden"})
+    ]:
+        losses: list[CoalitionLoss] = []
+        for seed in range(problems):
+            team = random_csp(3, 2, 1, 0, seed=seed, max_cost=1)
+            parameters = RunParameters(seed, settings)
+            report = coalition_report(team, protocol_named(name), 1, parameters=parameters, coins=4, costs=(0, 1))
+            losses += report.losses
+        values, messages = (
+            mean(getattr(one, f"excluded_by_{kind}") for one in losses) for kind in ("values", "messages")
+        )
+        hidden = ", hidden" if "search" in settings else ""
+        print(f"| `{name}`{hidden} | {values:.3f} | {messages:.3f} |", flush=True)
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("problems", nargs="?", type=int, default=PROBLEMS, metavar="PROBLEMS", help="how many")
+    problems = parser.parse_args().problems
+    print_costs(problems)
+    print_losses(problems)
+
+
+if __name__ == "__main__":
+    main()
