@@ -15,6 +15,8 @@ from robochoc.run.evaluation import check_assignment
 from robochoc.run.options import AnswerRule
 from robochoc.run.registry import installed_protocols
 from tests.support.cases import looped
+from tests.support.cost_problems import with_costs
+from tests.support.problems import team_of
 
 SIMULATOR = Options(protocol="dsa", runtime=Runtime.SIMULATOR, cache=False)
 INCOMPLETE = [
@@ -24,6 +26,7 @@ INCOMPLETE = [
     and one.protocol.traits.costs
     and not one.protocol.traits.complete
     and not one.protocol.traits.allocates
+    and not one.protocol.traits.secret_keys
     and one.protocol.__module__.startswith("robochoc.")
 ]
 
@@ -93,6 +96,16 @@ def broken() -> tuple[Team, Options]:
         options = replace(SIMULATOR, settings={"cycles": "2"})
         if solve(team, replace(options, repair=False)).verdict is Verdict.UNKNOWN:
             return team, options
+
+
+def test_a_private_search_is_not_repaired() -> None:
+    rows = tuple((one, two) for one in (1, 2) for two in (1, 2))
+    never = Relation("never", 2, Semantics.CONFLICTS, rows)
+    pairs = [Constraint("c", never, two, two) for two in (("A", "B"), ("B", "C"))]
+    team = with_costs(team_of(dict.fromkeys("ABC", (1, 2)), pairs))
+    outcome = solve(team, replace(SIMULATOR, protocol="p-dsa", settings={"cycles": "1", "bits": "31"}))
+    assert outcome.verdict == Verdict.UNKNOWN
+    assert outcome.repair is None
 
 
 def test_a_repair_has_the_same_result_in_every_runtime() -> None:
