@@ -184,8 +184,8 @@ benchmark-set: $(READY)  ## robochoc/leaderboard/instances.json: some minutes of
 	$(BIN)/python -m robochoc.leaderboard.certificates robochoc/leaderboard/instances.json
 
 # OF="--size small" takes a part of the set; BUDGET, ENTRANTS and JOBS change the rest.
-ENTRANTS ?= dpop sfb bnb-adopt maxsum dsa mgm mgm2 gdba abt afc-ng dba
-BUDGET ?= messages=20000,time=60
+ENTRANTS ?= dpop sfb atwb maxsum dsa mgm2 mcs-mgm gdba afc-ng dba
+BUDGET ?= messages=20000,time=600
 OF ?=
 leaderboard: $(READY)  ## protocols on the benchmark set: out/leaderboard/results.json, out/leaderboard/site/index.html
 	@mkdir -p out/leaderboard

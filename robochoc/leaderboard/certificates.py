@@ -1,7 +1,8 @@
 """The published list of the benchmark set: the digest of each instance, and its answer with the solvers that proved it.
 
 `python -m robochoc.leaderboard.certificates FILE` computes the list again (`make benchmark-set`). The two solvers of an
-instance share no code: one finds the answer, and the other one proves the same verdict and cost.
+instance share no code: one finds the answer, and the other one proves the same verdict and cost. An answer that only
+one solver can prove is the best known one: the list has its assignment, whose cost anyone can compute again.
 """
 
 from __future__ import annotations
@@ -33,10 +34,14 @@ TIMEOUT_S = 600.0
 
 
 class DisputedInstanceError(RobochocError):
-    """The two solvers of an instance disagree, or one of them proved nothing."""
+    """The solvers of an instance disagree, or one of them proved nothing."""
 
 
-class Certificate(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+BEST_KNOWN = "best-known"
+"""The verdict of an instance whose answer is not proved by two solvers."""
+
+
+class Certificate(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
     """An instance in the published list.
 
     Attributes:
@@ -48,12 +53,14 @@ class Certificate(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         scenario: The parameters of `robochoc generate scenario`. Empty: the problem does not change.
         sha256: The SHA-256 of the team's canonical form, which are the contents of its files.
         robots: The number of robots at the start.
-        verdict: The verdict: `optimal`, or `solution` or `no-solution` without costs. Of problems that change: of the
-            last epoch.
+        verdict: The verdict: `optimal` or `best-known`, or `solution` or `no-solution` without costs. Of problems that
+            change: of the last epoch.
         cost: The optimal cost, or the best known one.
-        bound: The proven bound of the cost, which equals the cost of an optimum.
-        proved_by: The solver that proved the answer.
-        agreed_by: The second solver, which proved the same.
+        bound: The proven bound of the cost: no assignment is better. It equals the cost of an optimum.
+        proved_by: The solver that proved the answer, or the bound.
+        agreed_by: The second solver, which proved the same. Empty for a best known answer.
+        found_by: The solver that found a best known answer.
+        assignment: A best known answer.
     """
 
     name: str
@@ -69,6 +76,30 @@ class Certificate(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     bound: int | None
     proved_by: str
     agreed_by: str
+    found_by: str = ""
+    assignment: dict[str, int] = {}
+
+    @property
+    def provers(self) -> str:
+        """The solvers that proved the answer or the bound, in words."""
+        return " and ".join(filter(None, [self.proved_by, self.agreed_by]))
+
+    @property
+    def known(self) -> str:
+        """The cost and the bound as part of a sentence, for answers with costs."""
+        if self.verdict == BEST_KNOWN:
+            return f"the best known cost is {self.cost}, and the bound {self.bound}"
+        return f"{self.provers} proved {self.cost}"
+
+    def is_reached_by(self, cost: int) -> bool:
+        """Return whether a cost is at least as good as the best known one, and not better than the bound."""
+        best, bound = self.cost or 0, self.bound or 0
+        return min(best, bound) <= cost <= max(best, bound)
+
+    def is_beyond_bound(self, cost: int, *, is_maximised: bool) -> bool:
+        """Return whether a cost is better than the proven bound allows."""
+        bound = self.bound or 0
+        return cost > bound if is_maximised else cost < bound
 
 
 class _Published(msgspec.Struct, frozen=True, kw_only=True):
@@ -86,17 +117,21 @@ def published() -> Mapping[str, Certificate]:
 
 
 def certify(instance: Instance) -> Certificate:
-    """Return the certificate of an instance, computed by both solvers.
+    """Return the certificate of an instance, computed by its solvers.
 
     Raises:
         DisputedInstanceError: if the solvers disagree, or one of them proved nothing.
     """
     team = instance.team()
     problem = instance.problem
-    first, second = instance.group.solvers
-    verdict, cost = _answer(team, first)
-    if (verdict, cost) != (again := _answer(team, second)) or verdict == Verdict.UNKNOWN:
-        raise DisputedInstanceError(f"{instance.name}: {first} answers {verdict} {cost}, but {second} {again}")
+    first, *others = instance.solvers
+    outcome = _outcome(team, first)
+    verdict, cost = answer_of(outcome)
+    if verdict == Verdict.UNKNOWN:
+        raise DisputedInstanceError(f"{instance.name}: {first} proved nothing within {TIMEOUT_S:g} s")
+    for second in others:
+        if (verdict, cost) != (again := answer_of(_outcome(team, second))):
+            raise DisputedInstanceError(f"{instance.name}: {first} answers {verdict} {cost}, but {second} {again}")
     return Certificate(
         name=instance.name,
         family=instance.family,
@@ -106,20 +141,22 @@ def certify(instance: Instance) -> Certificate:
         scenario=problem.scenario,
         sha256=sha256_of_team(team),
         robots=len(team.robots),
-        verdict=verdict,
+        verdict=verdict if others else BEST_KNOWN,
         cost=cost,
         bound=cost,
         proved_by=first,
-        agreed_by=second,
+        agreed_by=others[0] if others else "",
+        found_by="" if others else first,
+        assignment={} if others else dict(outcome.assignment),
     )
 
 
-def _answer(team: Team, solver: str) -> tuple[str, int | None]:
+def _outcome(team: Team, solver: str) -> Outcome:
     if solver == DPOP:
         options = Options(protocol=DPOP, runtime=Runtime.SIMULATOR, timeout=TIMEOUT_S)
     else:
         options = Options(protocol=CENTRAL, central_with=CentralSolverName(solver), timeout=TIMEOUT_S, cache=False)
-    return answer_of(solve(team, options))
+    return solve(team, options)
 
 
 def answer_of(outcome: Outcome) -> tuple[str, int | None]:

@@ -59,7 +59,7 @@ def _curve_faults(run: RunResult, best: Certificate, *, is_maximised: bool) -> I
         yield "a cost of the curve is not better than the one before"
     if best.cost is None:
         yield "has a curve, although the problem has no costs"
-    elif min(costs) < sign * best.cost:
-        yield f"the curve reaches {sign * min(costs)}, but {best.proved_by} and {best.agreed_by} proved {best.cost}"
+    elif best.is_beyond_bound(sign * min(costs), is_maximised=is_maximised):
+        yield f"the curve reaches {sign * min(costs)}, but {best.provers} proved {best.bound}"
     if run.cost is not None and costs[-1] != sign * run.cost:
         yield f"the curve ends with {run.curve[-1][1]}, but the answer costs {run.cost}"

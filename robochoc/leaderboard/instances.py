@@ -19,7 +19,7 @@ from robochoc.system.suggestions import did_you_mean
 
 SET_VERSION = 1
 """The version of the set. It changes whenever an instance changes."""
-SIZES = ("small",)
+SIZES = ("small", "medium")
 """The published sizes. A further size needs its parameters in each family, and certificates (`make benchmark-set`)."""
 SEEDS = 10
 """The number of instances of each family and size."""
@@ -41,6 +41,8 @@ class BenchmarkFamily:
         common: The parameters shared by all sizes.
         sizes: The parameters of each size.
         solvers: The two solvers that certify the optima: of the merged problem, or the distributed protocol `dpop`.
+        medium_solvers: The solvers of the size `medium`, if they differ. If there is only one, its answers count as
+            the best known ones, since no second solver confirms them.
         events: The number of changes over time. 0: the problem does not change.
         measures_privacy: True if the privacy loss is measured.
         has_seeds: False if there is one instance of each size.
@@ -51,7 +53,8 @@ class BenchmarkFamily:
     generator: str
     common: Mapping[str, Parameter]
     sizes: Mapping[str, Mapping[str, Parameter]]
-    solvers: tuple[str, str] = (TOULBAR2, CP_SAT)
+    solvers: tuple[str, ...] = (TOULBAR2, CP_SAT)
+    medium_solvers: tuple[str, ...] = ()
     events: int = 0
     measures_privacy: bool = False
     has_seeds: bool = True
@@ -64,15 +67,16 @@ FAMILIES: Mapping[str, BenchmarkFamily] = MappingProxyType(
             "Model B: Prosser, AIJ 81, 1996; Gent et al., Constraints 6, 2001",
             "random",
             {"domain": 5, "max_cost": 100},
-            {"small": {"agents": 10, "density": 0.4}},
+            {"small": {"agents": 10, "density": 0.4}, "medium": {"agents": 40, "density": 0.15}},
             (TOULBAR2, DPOP),
+            medium_solvers=(TOULBAR2,),
         ),
         "nary": BenchmarkFamily(
             "Random ternary problems",
             "Model RB: Xu and Li, JAIR 12, 2000",
             "nary",
             {"domain": 3, "arity": 3, "max_cost": 100},
-            {"small": {"agents": 10, "constraints": 10}},
+            {"small": {"agents": 10, "constraints": 10}, "medium": {"agents": 30, "constraints": 30}},
             (TOULBAR2, DPOP),
         ),
         "scale-free": BenchmarkFamily(
@@ -80,7 +84,7 @@ FAMILIES: Mapping[str, BenchmarkFamily] = MappingProxyType(
             "Barabási and Albert, Science 286, 1999",
             "random",
             {"graph": "scale-free", "domain": 4, "max_cost": 100},
-            {"small": {"agents": 12}},
+            {"small": {"agents": 12}, "medium": {"agents": 40}},
             (TOULBAR2, DPOP),
         ),
         "small-world": BenchmarkFamily(
@@ -88,7 +92,7 @@ FAMILIES: Mapping[str, BenchmarkFamily] = MappingProxyType(
             "Watts and Strogatz, Nature 393, 1998",
             "random",
             {"graph": "small-world", "domain": 4, "max_cost": 100},
-            {"small": {"agents": 12}},
+            {"small": {"agents": 12}, "medium": {"agents": 30}},
             (TOULBAR2, DPOP),
         ),
         "coloring-weighted": BenchmarkFamily(
@@ -96,7 +100,7 @@ FAMILIES: Mapping[str, BenchmarkFamily] = MappingProxyType(
             "Koljonen et al., SASO 2010",
             "coloring",
             {"colors": 3, "conflicts": "weighted", "max_cost": 100},
-            {"small": {"agents": 12, "degree": 5.0}},
+            {"small": {"agents": 12, "degree": 5.0}, "medium": {"agents": 40, "degree": 5.0}},
             (TOULBAR2, DPOP),
         ),
         "coloring-hard": BenchmarkFamily(
@@ -104,56 +108,61 @@ FAMILIES: Mapping[str, BenchmarkFamily] = MappingProxyType(
             "Yokoo et al., TKDE 10, 1998",
             "coloring",
             {"colors": 3, "conflicts": "hard", "degree": 4.2},
-            {"small": {"agents": 20}},
+            {"small": {"agents": 20}, "medium": {"agents": 50}},
         ),
         "meetings": BenchmarkFamily(
             "Meeting scheduling",
             "Maheswaran et al., AAMAS 2004",
             "meetings",
             {"model": "peav"},
-            {"small": {"agents": 5, "meetings": 5, "slots": 4}},
+            {"small": {"agents": 5, "meetings": 5, "slots": 4}, "medium": {"agents": 30, "meetings": 20, "slots": 6}},
         ),
         "sensors": BenchmarkFamily(
             "Sensor networks",
             "Béjar et al., AIJ 161, 2005",
             "grid-sensors",
             {"model": "sensors"},
-            {"small": {"rows": 4, "columns": 4, "targets": 3}},
+            {"small": {"rows": 4, "columns": 4, "targets": 3}, "medium": {"rows": 6, "columns": 6, "targets": 4}},
         ),
         "tracking": BenchmarkFamily(
             "Target tracking",
             "Zivan et al., JAAMAS 29, 2015",
             "tracking",
             {},
-            {"small": {"agents": 6, "targets": 5, "side": 8}},
+            {"small": {"agents": 6, "targets": 5, "side": 8}, "medium": {"agents": 30, "targets": 20, "side": 20}},
         ),
         "smart-homes": BenchmarkFamily(
             "Smart lighting",
             "Rust et al., IJCAI 2016",
             "smart-homes",
             {"levels": 4},
-            {"small": {"agents": 9, "rules": 6}},
+            {"small": {"agents": 9, "rules": 6}, "medium": {"agents": 30, "rules": 25}},
+            medium_solvers=(TOULBAR2, DPOP),
         ),
         "frequencies": BenchmarkFamily(
             "Frequency assignment",
             "Cabon et al., Constraints 4, 1999",
             "frequencies",
             {},
-            {"small": {"agents": 10, "frequencies": 4, "distance": 40}},
+            {
+                "small": {"agents": 10, "frequencies": 4, "distance": 40},
+                "medium": {"agents": 30, "frequencies": 6, "distance": 30},
+            },
+            medium_solvers=(TOULBAR2, DPOP),
         ),
         "tasks": BenchmarkFamily(
             "Task allocation",
             "Gerkey and Matarić, IJRR 23, 2004",
             "tasks",
             {"skills": 2},
-            {"small": {"agents": 6, "tasks": 6}},
+            {"small": {"agents": 6, "tasks": 6}, "medium": {"agents": 20, "tasks": 8}},
         ),
         "queens3d": BenchmarkFamily(
             "Queens in three dimensions",
             "the paper of the platform, Section 5.1",
             "queens3d",
             {},
-            {"small": {"n": 3}},
+            {"small": {"n": 3}, "medium": {"n": 5}},
             has_seeds=False,
         ),
         "dynamic": BenchmarkFamily(
@@ -161,7 +170,7 @@ FAMILIES: Mapping[str, BenchmarkFamily] = MappingProxyType(
             "Yeoh et al., AAMAS 2011",
             "random",
             {"domain": 4, "max_cost": 100},
-            {"small": {"agents": 8, "density": 0.4}},
+            {"small": {"agents": 8, "density": 0.4}, "medium": {"agents": 20, "density": 0.2}},
             (TOULBAR2, DPOP),
             events=4,
         ),
@@ -170,7 +179,7 @@ FAMILIES: Mapping[str, BenchmarkFamily] = MappingProxyType(
             "Grinshpoun et al., JAIR 47, 2013",
             "random",
             {"domain": 4, "max_cost": 100, "asymmetric": True},
-            {"small": {"agents": 8, "density": 0.4}},
+            {"small": {"agents": 8, "density": 0.4}, "medium": {"agents": 20, "density": 0.2}},
             (TOULBAR2, COSOCO),
         ),
         "privacy": BenchmarkFamily(
@@ -178,7 +187,7 @@ FAMILIES: Mapping[str, BenchmarkFamily] = MappingProxyType(
             "Greenstadt, Pearce and Tambe, AAAI 2006",
             "meetings",
             {"model": "eav"},
-            {"small": {"agents": 5, "meetings": 5, "slots": 4}},
+            {"small": {"agents": 5, "meetings": 5, "slots": 4}, "medium": {"agents": 20, "meetings": 20, "slots": 6}},
             measures_privacy=True,
         ),
     }
@@ -211,6 +220,12 @@ class Instance:
     def group(self) -> BenchmarkFamily:
         """The family."""
         return FAMILIES[self.family]
+
+    @property
+    def solvers(self) -> tuple[str, ...]:
+        """The solvers that certify the answer."""
+        group = self.group
+        return (self.size == "medium" and group.medium_solvers) or group.solvers
 
     @property
     def problem(self) -> ProblemSpec:

@@ -1,7 +1,7 @@
 """Scores of protocols: gaps, areas, ranks with ties, and intervals.
 
 The gap is the primal gap, and the area the primal integral over messages: Berthold, "Measuring the impact of primal
-heuristics", Operations Research Letters 41 (2013). The gap of a cost c to the best cost b is 0 if they are equal, 1 if
+heuristics", Operations Research Letters 41 (2013). The gap of a cost c to the best cost b is 0 if c is not worse, 1 if
 their signs differ or there is no answer, and |c - b| / max(|c|, |b|) otherwise. Without costs, the gap of a correct
 verdict is 0, and of none 1. The area is the mean gap of the best assignment so far over the budget of messages.
 """
@@ -79,7 +79,7 @@ def gap(run: RunResult, best: Certificate, cost: int | None = None) -> float:
     found = run.cost if cost is None else cost
     if found is None:
         return 1.0
-    if found == best.cost:
+    if best.is_reached_by(found):
         return 0.0
     if found * best.cost < 0:
         return 1.0
@@ -105,8 +105,8 @@ def area(run: RunResult, best: Certificate, budget: Budget) -> float | None:
     return (total + current * (end - since)) / end
 
 
-def family_scores(results: LeaderboardResults, family: str, sizes: Sequence[str] = ()) -> FamilyScores:
-    """Return the scores of a family, over all its instances in the results or those of some sizes.
+def family_scores(results: LeaderboardResults, family: str, size: str) -> FamilyScores:
+    """Return the scores of a family, over its instances of a size in the results.
 
     A protocol that refuses all instances of the family has no score; one that refuses some has the gap 1 on these.
     """
@@ -114,7 +114,7 @@ def family_scores(results: LeaderboardResults, family: str, sizes: Sequence[str]
     runs: dict[str, dict[str, RunResult]] = {}
     for run in results.runs:
         one = certificates[run.instance]
-        if one.family == family and one.size in (sizes or (one.size,)):
+        if (one.family, one.size) == (family, size):
             runs.setdefault(run.protocol, {})[run.instance] = run
     refused = [name for name, own in runs.items() if all(run.status == Status.REFUSED for run in own.values())]
     entered = {name: own for name, own in runs.items() if name not in refused}

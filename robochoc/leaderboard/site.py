@@ -13,7 +13,7 @@ from robochoc.leaderboard.certificates import Certificate, published
 from robochoc.leaderboard.instances import DPOP, FAMILIES
 from robochoc.leaderboard.results import LeaderboardResults, RunResult
 from robochoc.leaderboard.scores import gap
-from robochoc.leaderboard.tables import answer_text, family_tables, holders, overall, peer_remarks
+from robochoc.leaderboard.tables import answer_text, family_tables, holders, overall, peer_remarks, proof_text, sizes_of
 from robochoc.system.files import write_atomically
 
 INDEX = "index.html"
@@ -46,15 +46,16 @@ def write_site(results: LeaderboardResults, folder: Path) -> int:
 def _index(results: LeaderboardResults) -> Iterator[str]:
     yield _paragraph(budget_text(results))
     yield _paragraph(EXPLANATION)
-    yield "<h2>All families</h2>"
-    yield table(*overall(results))
     yield from map(_paragraph, peer_remarks(results))
-    for one in family_tables(results):
-        family = FAMILIES[one.family]
-        yield f"<h2>{html.escape(family.title)}</h2>"
-        yield _paragraph(f"{one.family}: {family.source}.")
-        yield table(one.headings, one.lines)
-        yield from map(_paragraph, one.remarks)
+    for size in sizes_of(results):
+        yield f"<h2>All families, {size}</h2>"
+        yield table(*overall(results, size))
+        for one in family_tables(results, size):
+            family = FAMILIES[one.family]
+            yield f"<h2>{html.escape(family.title)}, {size}</h2>"
+            yield _paragraph(f"{one.family}: {family.source}.")
+            yield table(one.headings, one.lines)
+            yield from map(_paragraph, one.remarks)
     yield "<h2>Instances</h2>"
     best = holders(results.runs)
     names = list(dict.fromkeys(run.instance for run in results.runs))
@@ -79,11 +80,11 @@ def budget_text(results: LeaderboardResults) -> str:
 def _instance(one: Certificate, runs: Sequence[RunResult], best: Sequence[RunResult]) -> Iterator[str]:
     yield f'<p><a href="{INDEX}">All results</a></p>'
     yield _paragraph(f"{FAMILIES[one.family].title}, {one.size}: {one.robots} robots. SHA-256 {one.sha256}.")
-    yield _paragraph(f"Answer: {answer_text(one)}. {one.proved_by} proved it, and {one.agreed_by} proved the same.")
+    yield _paragraph(f"Answer: {answer_text(one)}. {proof_text(one)}")
     folder = shlex.quote(one.name)
     commands = [
         f"robochoc leaderboard export {folder}",
-        *(_proof(folder, name) for name in (one.proved_by, one.agreed_by)),
+        *(_proof(folder, name) for name in dict.fromkeys((one.found_by, one.proved_by, one.agreed_by)) if name),
     ]
     yield f"<pre>{html.escape(chr(10).join(commands))}</pre>"
     yield _paragraph(f"Best answer here: {_names(best)}. 'robochoc leaderboard verify' computes its cost again.")

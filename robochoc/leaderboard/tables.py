@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from robochoc.experiments.statistics import MeanInterval
 from robochoc.experiments.summary import number
-from robochoc.leaderboard.certificates import Certificate, published
-from robochoc.leaderboard.instances import FAMILIES
+from robochoc.leaderboard.certificates import BEST_KNOWN, Certificate, published
+from robochoc.leaderboard.instances import FAMILIES, SIZES
 from robochoc.leaderboard.peers.claims import wrong_claims_of_peers
 from robochoc.leaderboard.results import LeaderboardResults, RunResult, is_peer_name
 from robochoc.leaderboard.scores import FamilyScores, Score, family_scores, gap
@@ -37,11 +37,18 @@ class FamilyTable(NamedTuple):
     remarks: list[str]
 
 
-def family_tables(results: LeaderboardResults, sizes: Sequence[str] = ()) -> Iterator[FamilyTable]:
-    """Yield the tables of the families in the results, in the order of the set."""
-    there = {published()[run.instance].family for run in results.runs}
+def sizes_of(results: LeaderboardResults) -> list[str]:
+    """Return the sizes of the instances in the results, in the order of the set."""
+    there = {published()[run.instance].size for run in results.runs}
+    return [size for size in SIZES if size in there]
+
+
+def family_tables(results: LeaderboardResults, size: str) -> Iterator[FamilyTable]:
+    """Yield the tables of the families in the results, over the instances of a size, in the order of the set."""
+    certificates = [published()[run.instance] for run in results.runs]
+    there = {one.family for one in certificates if one.size == size}
     for family in (name for name in FAMILIES if name in there):
-        scores = family_scores(results, family, sizes)
+        scores = family_scores(results, family, size)
         if scores.scores:
             yield _table(family, scores)
 
@@ -84,12 +91,12 @@ def _remarks(scores: FamilyScores) -> Iterator[str]:
         yield f"Not for this family: {', '.join(scores.refused)}."
 
 
-def overall(results: LeaderboardResults) -> tuple[list[str], list[list[str]]]:
-    """Return the headings and lines of the table over all families.
+def overall(results: LeaderboardResults, size: str) -> tuple[list[str], list[list[str]]]:
+    """Return the headings and lines of the table over all families, over the instances of a size.
 
     The protocols accept different families, so there are no ranks over all families, but numbers of families.
     """
-    by_family = {table.family: family_scores(results, table.family) for table in family_tables(results)}
+    by_family = {table.family: family_scores(results, table.family, size) for table in family_tables(results, size)}
     lines = []
     for name in [one.name for one in results.entrants]:
         own = [one for scores in by_family.values() for one in scores.scores if one.protocol == name]
@@ -130,4 +137,16 @@ def holders(runs: Sequence[RunResult]) -> Mapping[str, list[RunResult]]:
 
 def answer_text(one: Certificate) -> str:
     """Return the published answer of an instance as text."""
+    if one.verdict == BEST_KNOWN:
+        return f"best known {one.cost}, bound {one.bound}"
     return one.verdict if one.cost is None else f"{one.verdict} {one.cost}"
+
+
+def proof_text(one: Certificate) -> str:
+    """Return how the published answer of an instance was found and checked, in sentences."""
+    if one.verdict == BEST_KNOWN:
+        return (
+            f"{one.found_by} found the assignment, whose cost robochoc's checker has computed. {one.provers} proved the"
+            " bound, which no second solver has confirmed."
+        )
+    return f"{one.proved_by} proved it, and {one.agreed_by} proved the same."

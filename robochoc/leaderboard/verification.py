@@ -70,8 +70,8 @@ def _faults(run: RunResult, team: Team, best: Certificate) -> Iterator[str]:
         return
     if run.cost is None:
         yield "has an assignment, but no cost"
-    elif run.verdict == Verdict.OPTIMAL and run.cost != best.cost:
-        yield f"claims the optimum {run.cost}, but {best.proved_by} and {best.agreed_by} proved {best.cost}"
+    elif run.verdict == Verdict.OPTIMAL and not best.is_reached_by(run.cost):
+        yield f"claims the optimum {run.cost}, but {best.known}"
 
 
 class Repetition:

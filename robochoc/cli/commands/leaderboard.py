@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from robochoc.leaderboard.peers.running import PeerEntrant
     from robochoc.leaderboard.results import Budget, LeaderboardResults
 
-SIZES = ("small",)
+SIZES = ("small", "medium")
 BUDGET = {"messages": "messages", "ncccs": "ncccs", "cycles": "cycles", "time": "time_s"}
 MOST_FAULTS = 20
 FORMATS = ("robochoc", "xcsp3", "frodo", "pydcop")
@@ -65,12 +65,14 @@ def leaderboard() -> None:
     """  # noqa: D301 - \\b keeps click from wrapping the lines
 
 
-@leaderboard.command("list", short_help="List the instances of the set, with their optima.")
+@leaderboard.command("list", short_help="List the instances of the set, with their answers.")
 @family_option
 @size_option
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per instance.")
 def list_(families: tuple[str, ...], sizes: tuple[str, ...], *, as_json: bool) -> None:
-    """List the instances of the benchmark set: their answers, and the two solvers that proved each answer.
+    """List the instances of the benchmark set: their answers, and the solvers that proved each answer.
+
+    An answer that only one solver has proved is not called optimal, but best known.
 
     \b
     robochoc leaderboard list --family tracking
@@ -79,13 +81,16 @@ def list_(families: tuple[str, ...], sizes: tuple[str, ...], *, as_json: bool) -
     from robochoc.leaderboard.certificates import published
     from robochoc.leaderboard.tables import answer_text
 
-    for one in (published()[found.name] for found in _instances(families, sizes)):
+    listed = [published()[found.name] for found in _instances(families, sizes)]
+    width = max(14, *(len(answer_text(one)) for one in listed))
+    for one in listed:
         if as_json:
             import msgspec
 
             click.echo(msgspec.json.encode(one))
             continue
-        click.echo(f"{one.name:26} {one.robots:3} robots  {answer_text(one):14} {one.proved_by}, {one.agreed_by}")
+        provers = ", ".join(filter(None, [one.proved_by, one.agreed_by]))
+        click.echo(f"{one.name:26} {one.robots:3} robots  {answer_text(one):{width}} {provers}")
 
 
 @leaderboard.command(short_help="Write an instance as a team, or for another tool.")

@@ -18,7 +18,6 @@ def wrong_claims_of_peers(runs: Sequence[RunResult]) -> Iterator[str]:
 
 def wrong_claim(run: RunResult, best: Certificate) -> str:
     """Return the error in what a peer states about its answer; empty if there is none."""
-    proved = f"{best.proved_by} and {best.agreed_by} proved {best.cost}"
     if run.claimed_verdict == Verdict.NO_SOLUTION:
         return "" if best.verdict == Verdict.NO_SOLUTION else f"claims no-solution, but {best.proved_by} found one"
     if run.claimed_verdict is None:
@@ -28,6 +27,6 @@ def wrong_claim(run: RunResult, best: Certificate) -> str:
         return f"claims a valid assignment{cost}, but it has none or violates hard constraints"
     if run.cost is not None and run.claimed_cost not in {None, run.cost}:
         return f"claims the cost {run.claimed_cost:g}, but its assignment costs {run.cost}"
-    if run.claimed_verdict == Verdict.OPTIMAL and run.cost != best.cost:
-        return f"claims the optimum {run.cost}, but {proved}"
+    if run.claimed_verdict == Verdict.OPTIMAL and run.cost is not None and not best.is_reached_by(run.cost):
+        return f"claims the optimum {run.cost}, but {best.known}"
     return ""

@@ -9,6 +9,7 @@ import pytest
 from robochoc.experiments.digests import sha256_of_team
 from robochoc.leaderboard import certificates
 from robochoc.leaderboard.certificates import (
+    BEST_KNOWN,
     DisputedInstanceError,
     certify,
     list_content,
@@ -22,6 +23,8 @@ from robochoc.leaderboard.instances import (
     instance_named,
     instances,
 )
+from robochoc.leaderboard.tables import answer_text, proof_text
+from robochoc.verification.checker import check_user_cost, violations
 from tests.support.cases import looped
 
 ONE_OF_EACH = [f"{name}-{SIZES[0]}-0" for name in FAMILIES]
@@ -52,12 +55,31 @@ def test_all_instances_have_their_digests() -> None:
 def test_each_optimum_has_two_proofs() -> None:
     for one in published().values():
         assert one.proved_by != one.agreed_by
-        assert one.verdict in {"optimal", "solution", "no-solution"}
-        assert (one.cost is not None) == (one.verdict == "optimal")
-        assert one.bound == one.cost
+        assert one.verdict in {"optimal", "solution", "no-solution", BEST_KNOWN}
+        assert (one.cost is not None) == (one.verdict in {"optimal", BEST_KNOWN})
+        assert one.bound == one.cost or one.verdict == BEST_KNOWN
+        assert bool(one.agreed_by) == (one.verdict != BEST_KNOWN) == (not one.assignment) == (not one.found_by)
 
 
-@looped("name", ["random-small-0", "coloring-hard-small-1", "tasks-small-2"])
+def test_the_assignments_of_best_known_answers_have_their_costs() -> None:
+    best_known = [one for one in published().values() if one.verdict == BEST_KNOWN]
+    assert {one.family for one in best_known} == {"random"}
+    for one in best_known:
+        team = instance_named(one.name).team()
+        assert list(violations(team, one.assignment)) == []
+        check_user_cost(team, one.assignment, one.cost)
+
+
+def test_no_solver_confirms_a_best_known_answer() -> None:
+    one = published()["random-medium-0"]
+    assert answer_text(one) == f"best known {one.cost}, bound {one.bound}"
+    assert proof_text(one) == (
+        "toulbar2 found the assignment, whose cost robochoc's checker has computed. toulbar2 proved the bound, which no"
+        " second solver has confirmed."
+    )
+
+
+@looped("name", ["random-small-0", "coloring-hard-small-1", "tasks-small-2", "random-medium-0"])
 def test_a_certificate_is_computed_again(name: str) -> None:
     assert certify(instance_named(name)) == published()[name]
 
@@ -74,10 +96,13 @@ def test_the_written_list_is_the_published_one() -> None:
 
 
 def test_solvers_that_disagree_are_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    answers = iter([("optimal", 3), ("optimal", 4)])
-    monkeypatch.setattr(certificates, "_answer", lambda *_: next(answers))
+    answers = iter([("optimal", 3), ("optimal", 4), ("unknown", None)])
+    monkeypatch.setattr(certificates, "_outcome", lambda *_: None)
+    monkeypatch.setattr(certificates, "answer_of", lambda _: next(answers))
     with pytest.raises(DisputedInstanceError, match="random-small-0: toulbar2 answers optimal 3, but dpop"):
         certify(instance_named("random-small-0"))
+    with pytest.raises(DisputedInstanceError, match="random-medium-0: toulbar2 proved nothing within 600 s"):
+        certify(instance_named("random-medium-0"))
 
 
 def test_unknown_names_are_refused() -> None:

@@ -74,7 +74,7 @@ def test_a_right_answer_is_checked_and_its_missing_counts_stay_missing(tmp_path:
     repetition = Repetition(found, None)
     assert repetition.runs == []
     assert "only the answers of peers are checked" in repetition.remarks[0]
-    scores = {one.protocol: one for one in family_scores(found, "random").scores}
+    scores = {one.protocol: one for one in family_scores(found, "random", "small").scores}
     assert (scores["pydcop:dpop"].messages, scores["pydcop:dpop"].bytes, scores["pydcop:dpop"].area) == (94, None, None)
 
 

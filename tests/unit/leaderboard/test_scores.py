@@ -8,7 +8,7 @@ import msgspec
 import pytest
 
 from robochoc.experiments.task import Status
-from robochoc.leaderboard.certificates import published
+from robochoc.leaderboard.certificates import BEST_KNOWN, published
 from robochoc.leaderboard.results import Budget, Entrant, LeaderboardResults, RunResult
 from robochoc.leaderboard.scores import area, family_scores, gap, ranks_of
 from robochoc.leaderboard.tables import family_tables, holders, overall
@@ -34,6 +34,15 @@ def test_gaps() -> None:
     zero = msgspec.structs.replace(best, cost=0)
     assert gap(answer(0), zero) == 0
     assert gap(answer(7), zero) == 1
+
+
+def test_answers_between_the_best_known_one_and_the_bound_have_no_gap() -> None:
+    best = msgspec.structs.replace(published()[COSTS], verdict=BEST_KNOWN, cost=100, bound=80)
+    assert [gap(answer(cost), best) for cost in (79, 80, 90, 100, 125)] == [pytest.approx(0.21), 0, 0, 0, 0.2]
+    assert [best.is_beyond_bound(cost, is_maximised=False) for cost in (79, 80, 100)] == [True, False, False]
+    profit = msgspec.structs.replace(best, bound=120)
+    assert [gap(answer(cost), profit) for cost in (80, 100, 120)] == [pytest.approx(0.2), 0, 0]
+    assert [profit.is_beyond_bound(cost, is_maximised=True) for cost in (100, 120, 121)] == [False, False, True]
 
 
 def test_areas() -> None:
@@ -86,7 +95,7 @@ def ten_of_each(**factors: int) -> list[RunResult]:
 
 def test_the_best_are_those_that_are_not_significantly_worse() -> None:
     refused = [RunResult(instance=f"random-small-{seed}", protocol="none", status=Status.REFUSED) for seed in range(10)]
-    found = family_scores(results(*ten_of_each(one=1, same=1, worse=2), *refused), "random")
+    found = family_scores(results(*ten_of_each(one=1, same=1, worse=2), *refused), "random", "small")
     assert found.refused == ("none",)
     assert [(one.protocol, one.rank.mean, one.is_best, one.best) for one in found.scores] == [
         ("one", 1.5, True, 10),
@@ -103,14 +112,14 @@ def test_protocols_without_answers_are_not_the_best() -> None:
         for seed in range(10)
         for name in ("a", "b")
     ]
-    found = family_scores(results(*nothing), "random")
+    found = family_scores(results(*nothing), "random", "small")
     assert [one.is_best for one in found.scores] == [False, False]
     assert found.p is None
 
 
 def test_tables_and_holders() -> None:
     runs = results(*ten_of_each(one=1, worse=2))
-    headings, lines = overall(runs)
+    headings, lines = overall(runs, "small")
     assert dict(zip(headings, lines[0], strict=True)) == {
         "protocol": "one",
         "families": "1",
@@ -120,7 +129,7 @@ def test_tables_and_holders() -> None:
         "instances": "10",
         "mean gap": "0.000",
     }
-    (table,) = family_tables(runs)
+    (table,) = family_tables(runs, "small")
     assert table.family == "random"
     assert [line[0] for line in table.lines] == ["one*", "worse"]
     assert "messages" not in table.headings
