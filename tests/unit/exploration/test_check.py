@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from robochoc.exploration import check
+from robochoc.exploration import check, state_graph
 from robochoc.exploration.changes import Course
 from robochoc.exploration.check import CheckedTeam, CheckOptions, checked
 from robochoc.exploration.components import strong_components
@@ -156,10 +156,12 @@ class Floods(ABT):
         pass
 
 
-def test_a_state_with_too_many_packets_ends_the_search() -> None:
+def test_a_state_with_too_many_packets_ends_the_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(state_graph, "MOST_PACKETS", 100)
     options = CheckOptions(Floods, Options(protocol="abt", runtime=Runtime.SIMULATOR), packets=True)
     (partly,) = checked([next(small_teams(ABT.traits, 3, 2, 0))], options)
     assert not partly.exploration.is_complete
+    assert partly.exploration.states < options.states
 
 
 class WritesToNobody(ABT):
