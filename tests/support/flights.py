@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -16,6 +16,7 @@ from robochoc.flight.log import ClosestApproach, FlightEvent, FlightLog, LegTime
 from robochoc.flight.mission import Mission, mission_of
 from robochoc.flight.preview import preview_of
 from robochoc.generators.queens3d import queens3d
+from robochoc.maps.ground_map import GroundMap
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.problem import Domain, Robot, Team, Variable
 from robochoc.view import scene as scenes
@@ -109,6 +110,21 @@ def epochs_of_three(team: str = "watch") -> Outcome:
     )
 
 
+def solution(assignment: Mapping[str, int], team: str = "x", **parts: Any) -> Outcome:  # noqa: ANN401 - of any type
+    """Return the outcome of a run that has found `assignment`."""
+    return Outcome(
+        Verdict.SOLUTION, team=team, protocol="abt", runtime="simulator", seed=0, assignment={**assignment}, **parts
+    )
+
+
+def mission_to(team: Team, ground: GroundMap, cells: Sequence[int], withdrawn: tuple[str, ...]) -> Mission:
+    """Return the mission of robots that go to the cells of these numbers, unless they are `withdrawn`."""
+    values = {f"V{number}": cell for number, cell in enumerate(cells, 1)}
+    names = tuple(robot.name for robot in team.robots)
+    epochs = (EpochOutcome(Verdict.SOLUTION, robots=names, assignment=values),) if withdrawn else ()
+    return mission_of(solution(values, team.name, withdrawn=withdrawn, epochs=epochs), team, ground=ground)
+
+
 def planar(n: int, *away: str) -> Mission:
     """The mission of a solution made by hand: 3 i + 5 j, modulo n. Who is `away` has withdrawn."""
     team = queens3d(n)
@@ -121,18 +137,7 @@ def planar(n: int, *away: str) -> Mission:
         for variable in robot.variables
     }
     values = {name: height % n + 1 for name, height in heights.items()}
-    return mission_of(
-        Outcome(
-            Verdict.SOLUTION,
-            team=team.name,
-            protocol="abt",
-            runtime="simulator",
-            seed=0,
-            assignment=values,
-            withdrawn=away,
-        ),
-        team,
-    )
+    return mission_of(solution(values, team.name, withdrawn=away), team)
 
 
 def commands_of(html: bytes) -> list[dict[str, Any]]:

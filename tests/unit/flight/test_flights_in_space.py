@@ -19,8 +19,8 @@ from robochoc.flight.quadrotor.conditions import FlightConditions, MotorFailure
 from robochoc.generators.maps.formation import formation
 from robochoc.generators.maps.map_team import MapChoice
 from robochoc.maps.ground_map import GroundMap, ground_map_json, read_ground_map
-from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.problem import Team
+from tests.support.flights import mission_to, solution
 from tests.support.flights_in_space import flown_in_space, gaps_in_space
 from tests.support.flown_teams import FlownTeam
 from tests.support.octomaps import FREE, Voxel, write_octomap
@@ -52,23 +52,11 @@ def sent(
     volume = ground.volume
     assert volume is not None
     firsts = (*ground.first, volume.first)
-    values = {}
-    for number, place in enumerate(places, 1):
+    cells = []
+    for place in places:
         x, y, z = (round(part / (ground.scale or 1)) - first for part, first in zip(place, firsts, strict=True))
-        values[f"V{number}"] = (z * ground.rows + y) * ground.columns + x
-    names = tuple(robot.name for robot in team.robots)
-    epochs = (EpochOutcome(Verdict.SOLUTION, robots=names, assignment=values),) if withdrawn else ()
-    outcome = Outcome(
-        Verdict.SOLUTION,
-        team=team.name,
-        protocol="abt",
-        runtime="simulator",
-        seed=0,
-        assignment=values,
-        withdrawn=withdrawn,
-        epochs=epochs,
-    )
-    return mission_of(outcome, team, ground=ground)
+        cells.append((z * ground.rows + y) * ground.columns + x)
+    return mission_to(team, ground, cells, withdrawn)
 
 
 # A house with large voxels, a loose map, and a wall with a narrow hole.
@@ -148,7 +136,7 @@ def test_what_cannot_be_flown_is_said_in_one_sentence(tmp_path: Path) -> None:
         fly(sent(team, ground, (3.5, 0.5, 0.5), (1.5, 0.5, 1)))
     with pytest.raises(ValueError, match=r"the map with walls has the scale 0.5 m"):
         mission_of(
-            Outcome(Verdict.SOLUTION, team="x", protocol="abt", runtime="simulator", seed=0, assignment={"V1": 40}),
+            solution({"V1": 40}),
             team,
             2.0,
             ground,

@@ -21,9 +21,9 @@ from robochoc.generators.maps.map_team import MapChoice
 from robochoc.maps.ground_map import GroundMap, ground_map_json, read_ground_map
 from robochoc.maps.routes.floor_plan import FloorPlan
 from robochoc.maps.walls import PixelFrame
-from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.problem import Team
 from tests.support.examples import examples
+from tests.support.flights import mission_to, solution
 from tests.support.flights_on_maps import flown_team, gaps
 from tests.support.flown_teams import FlownTeam
 from tests.support.maps import ROOMS, write_map
@@ -44,20 +44,7 @@ def hall(folder: Path, **how: object) -> tuple[Team, GroundMap]:
 def sent(team: Team, ground: GroundMap, *places: tuple[int, int], withdrawn: tuple[str, ...] = ()) -> Mission:
     """Return the mission of robots that go to these cells, given by x and y."""
     cells = [(y - ground.first[1]) * ground.columns + x - ground.first[0] for x, y in places]
-    values = {f"V{number}": cell for number, cell in enumerate(cells, 1)}
-    names = tuple(robot.name for robot in team.robots)
-    epochs = (EpochOutcome(Verdict.SOLUTION, robots=names, assignment=values),) if withdrawn else ()
-    outcome = Outcome(
-        Verdict.SOLUTION,
-        team=team.name,
-        protocol="abt",
-        runtime="simulator",
-        seed=0,
-        assignment=values,
-        withdrawn=withdrawn,
-        epochs=epochs,
-    )
-    return mission_of(outcome, team, ground=ground)
+    return mission_to(team, ground, cells, withdrawn)
 
 
 # Seeds with a building, a loose map, narrow doors, large pixels, downwash; one that once led through a wall (45), and
@@ -159,7 +146,7 @@ def test_what_cannot_be_flown_is_said_in_one_sentence(tmp_path: Path) -> None:
         fly(sent(team, ground, (7, 2), (4, 1)))
     with pytest.raises(ValueError, match=r"the map with walls has the scale 0.5 m"):
         mission_of(
-            Outcome(Verdict.SOLUTION, team="x", protocol="abt", runtime="simulator", seed=0, assignment={"V1": 40}),
+            solution({"V1": 40}),
             team,
             2.0,
             ground,
@@ -176,7 +163,7 @@ def test_a_map_with_tiny_cells_is_flown_in_a_picture_with_its_walls(tmp_path: Pa
     values["V2"] = next(value for value in team.robots[1].variables[0].domain if value != values["V1"])
     preview = preview_of(
         mission_of(
-            Outcome(Verdict.SOLUTION, team="x", protocol="abt", runtime="simulator", seed=0, assignment=values),
+            solution(values),
             team,
             ground=ground,
         )
