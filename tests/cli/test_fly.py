@@ -12,8 +12,9 @@ import pytest
 from robochoc.formats import write_team
 from robochoc.formats.result import result_json
 from robochoc.generators.queens3d import queens3d
-from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
+from robochoc.model.outcome import EpochOutcome, Verdict
 from tests.support.cases import cases
+from tests.support.outcomes import outcome_of
 from tests.support.program import ROOT, robochoc_within
 from tests.support.solve_ros import HANGAR, SIMULATED, messages, ran
 
@@ -31,7 +32,7 @@ def flown(*words: object) -> dict[str, Any]:
 
 def saved(folder: Path, values: dict[str, int], *, epochs: tuple[EpochOutcome, ...] = (), name: str = "two") -> Path:
     verdict = Verdict.SOLUTION if values else Verdict.NO_SOLUTION
-    outcome = Outcome(verdict, team=name, protocol="abt", runtime="simulator", seed=0, assignment=values, epochs=epochs)
+    outcome = outcome_of(values, verdict, team=name, epochs=epochs)
     path = folder / "result.json"
     path.write_bytes(result_json(outcome))
     return path
@@ -144,9 +145,7 @@ def test_places_far_from_the_origin_are_flown_there(tmp_path: Path) -> None:
 
 
 def test_drones_of_one_name_are_all_told(tmp_path: Path) -> None:
-    outcome = Outcome(
-        Verdict.SOLUTION, team="t", protocol="abt", runtime="simulator", seed=0, assignment={"A": 1}, withdrawn=("A",)
-    )
+    outcome = outcome_of({"A": 1}, withdrawn=("A",))
     (tmp_path / "result.json").write_bytes(result_json(outcome))
     assert [drone["name"] for drone in flown(tmp_path / "result.json")["drones"]] == ["A", "A"]
 

@@ -21,6 +21,7 @@ from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.problem import Domain, Robot, Team, Variable
 from robochoc.view import scene as scenes
 from robochoc.view.scene import Scene
+from tests.support.outcomes import outcome_of
 
 FPS = 30
 LEG_S = 2
@@ -105,16 +106,7 @@ def epochs_of_three(team: str = "watch") -> Outcome:
         EpochOutcome(Verdict.NO_SOLUTION, robots=everybody[:4], opened_by="-R5.1"),
         EpochOutcome(Verdict.SOLUTION, robots=everybody[:4], opened_by="V2.1 without <2>", assignment=last),
     )
-    return Outcome(
-        Verdict.SOLUTION, team=team, protocol="dynabt", runtime="simulator", seed=0, assignment=last, epochs=epochs
-    )
-
-
-def solution(assignment: Mapping[str, int], team: str = "x", **parts: Any) -> Outcome:  # noqa: ANN401 - of any type
-    """Return the outcome of a run that has found `assignment`."""
-    return Outcome(
-        Verdict.SOLUTION, team=team, protocol="abt", runtime="simulator", seed=0, assignment={**assignment}, **parts
-    )
+    return outcome_of(last, team=team, protocol="dynabt", epochs=epochs)
 
 
 def mission_to(team: Team, ground: GroundMap, cells: Sequence[int], withdrawn: tuple[str, ...]) -> Mission:
@@ -122,7 +114,7 @@ def mission_to(team: Team, ground: GroundMap, cells: Sequence[int], withdrawn: t
     values = {f"V{number}": cell for number, cell in enumerate(cells, 1)}
     names = tuple(robot.name for robot in team.robots)
     epochs = (EpochOutcome(Verdict.SOLUTION, robots=names, assignment=values),) if withdrawn else ()
-    return mission_of(solution(values, team.name, withdrawn=withdrawn, epochs=epochs), team, ground=ground)
+    return mission_of(outcome_of(values, team=team.name, withdrawn=withdrawn, epochs=epochs), team, ground=ground)
 
 
 def planar(n: int, *away: str) -> Mission:
@@ -137,7 +129,7 @@ def planar(n: int, *away: str) -> Mission:
         for variable in robot.variables
     }
     values = {name: height % n + 1 for name, height in heights.items()}
-    return mission_of(solution(values, team.name, withdrawn=away), team)
+    return mission_of(outcome_of(values, team=team.name, withdrawn=away), team)
 
 
 def commands_of(html: bytes) -> list[dict[str, Any]]:

@@ -20,8 +20,8 @@ from robochoc.generators.maps.formation import formation
 from robochoc.generators.maps.map_team import MapChoice
 from robochoc.generators.maps.patrol import patrol
 from robochoc.maps.ground_map import GroundMap, ground_map_json, read_ground_map
-from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
+from tests.support.outcomes import outcome_of
 
 Array = npt.NDArray[np.float64]
 
@@ -95,7 +95,7 @@ def flown_on(
         values[variable.name] = chance.choice(free)
     ground = read_ground_map(ground_map_json(ground))
     mission = mission_of(
-        Outcome(Verdict.SOLUTION, team=team.name, protocol="abt", runtime="simulator", seed=0, assignment=values),
+        outcome_of(values, team=team.name),
         team,
         ground=ground,
     )

@@ -14,10 +14,10 @@ from robochoc.generators.maps.coverage import coverage
 from robochoc.generators.maps.formation import formation
 from robochoc.generators.maps.map_team import MapChoice
 from robochoc.maps.ground_map import GroundMap, ground_map_json, read_ground_map
-from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
 from tests.support.flights_on_maps import rooms
 from tests.support.maps import drawn_rows, write_map
+from tests.support.outcomes import outcome_of
 
 NO_TEAM = "no team"
 _RADII = (0, 0.01, 0.05, 0.1, 0.12, 0.15, 0.2, 0.2, 0.2, 0.23, 0.25, 0.3, 0.37, 0.5)
@@ -79,7 +79,7 @@ def _sent(chance: Random, team: Team, ground: GroundMap) -> Mission:
             raise ValueError("there are more robots than cells")
         values[robot.variables[0].name] = chance.choice(left)
     return mission_of(
-        Outcome(Verdict.SOLUTION, team=team.name, protocol="abt", runtime="simulator", seed=0, assignment=values),
+        outcome_of(values, team=team.name),
         team,
         ground=ground,
     )

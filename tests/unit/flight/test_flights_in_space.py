@@ -20,10 +20,11 @@ from robochoc.generators.maps.formation import formation
 from robochoc.generators.maps.map_team import MapChoice
 from robochoc.maps.ground_map import GroundMap, ground_map_json, read_ground_map
 from robochoc.model.problem import Team
-from tests.support.flights import mission_to, solution
+from tests.support.flights import mission_to
 from tests.support.flights_in_space import flown_in_space, gaps_in_space
 from tests.support.flown_teams import FlownTeam
 from tests.support.octomaps import FREE, Voxel, write_octomap
+from tests.support.outcomes import outcome_of
 
 NO_ROOM = re.compile(
     r"that keeps its radius of|and the minimum is"
@@ -136,7 +137,7 @@ def test_what_cannot_be_flown_is_said_in_one_sentence(tmp_path: Path) -> None:
         fly(sent(team, ground, (3.5, 0.5, 0.5), (1.5, 0.5, 1)))
     with pytest.raises(ValueError, match=r"the map with walls has the scale 0.5 m"):
         mission_of(
-            solution({"V1": 40}),
+            outcome_of({"V1": 40}),
             team,
             2.0,
             ground,

@@ -23,10 +23,11 @@ from robochoc.maps.routes.floor_plan import FloorPlan
 from robochoc.maps.walls import PixelFrame
 from robochoc.model.problem import Team
 from tests.support.examples import examples
-from tests.support.flights import mission_to, solution
+from tests.support.flights import mission_to
 from tests.support.flights_on_maps import flown_team, gaps
 from tests.support.flown_teams import FlownTeam
 from tests.support.maps import ROOMS, write_map
+from tests.support.outcomes import outcome_of
 from tests.support.program import ROOT
 from tests.support.ways_on_maps import NO_TEAM, refused_way
 
@@ -146,7 +147,7 @@ def test_what_cannot_be_flown_is_said_in_one_sentence(tmp_path: Path) -> None:
         fly(sent(team, ground, (7, 2), (4, 1)))
     with pytest.raises(ValueError, match=r"the map with walls has the scale 0.5 m"):
         mission_of(
-            solution({"V1": 40}),
+            outcome_of({"V1": 40}),
             team,
             2.0,
             ground,
@@ -163,7 +164,7 @@ def test_a_map_with_tiny_cells_is_flown_in_a_picture_with_its_walls(tmp_path: Pa
     values["V2"] = next(value for value in team.robots[1].variables[0].domain if value != values["V1"])
     preview = preview_of(
         mission_of(
-            solution(values),
+            outcome_of(values),
             team,
             ground=ground,
         )

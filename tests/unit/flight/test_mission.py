@@ -16,6 +16,7 @@ from robochoc.flight.mission import VAST_M, Mission, mission_of
 from robochoc.model.expression import Apply, Constant, Name
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.problem import AddAgent, Domain, Robot, ScenarioEvent, Team, Topic, Variable
+from tests.support.outcomes import outcome_of
 
 
 def robot(name: str, z: str, x: int, y: int, *, times: int = 1) -> Robot:
@@ -27,9 +28,7 @@ TEAM = Team("duo", (robot("A", "a", 1, 1), robot("B", "b", 1, 2)))
 
 
 def result(values: dict[str, int], *withdrawn: str, verdict: Verdict = Verdict.SOLUTION) -> Outcome:
-    return Outcome(
-        verdict, team="duo", protocol="abt", runtime="simulator", seed=0, assignment=values, withdrawn=withdrawn
-    )
+    return outcome_of(values, verdict, team="duo", withdrawn=withdrawn)
 
 
 def goals(mission: Mission, leg: int = -1) -> dict[str, tuple[tuple[float, float, float], bool]]:
@@ -72,15 +71,7 @@ def test_each_epoch_is_a_leg() -> None:
         EpochOutcome(Verdict.NO_SOLUTION, robots=("A", "B", "C"), opened_by="fog"),
         EpochOutcome(Verdict.SOLUTION, robots=("B", "C"), opened_by="-A", assignment={"b": 4, "c": 1}),
     )
-    outcome = Outcome(
-        Verdict.SOLUTION,
-        team="trio",
-        protocol="dynabt",
-        runtime="simulator",
-        seed=0,
-        assignment={"b": 4, "c": 1},
-        epochs=epochs,
-    )
+    outcome = outcome_of({"b": 4, "c": 1}, team="trio", protocol="dynabt", epochs=epochs)
     mission = mission_of(outcome, team)
     assert [leg.opened_by for leg in mission.legs] == ["the start", "+C", "fog", "-A"]
     assert [sorted(goals(mission, leg)) for leg in range(4)] == [["A", "B"], ["A", "B", "C"], [], ["A", "B", "C"]]

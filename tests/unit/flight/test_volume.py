@@ -13,12 +13,13 @@ from robochoc.flight.mission import MissionBlock, mission_of
 from robochoc.flight.preview import preview_of
 from robochoc.maps.ground_map import GroundMap, Volume, ground_map_json, read_ground_map
 from robochoc.model.expression import Constant, Name
-from robochoc.model.outcome import Outcome, Verdict
+from robochoc.model.outcome import Outcome
 from robochoc.model.problem import Domain, Robot, Team, Topic, Variable
 from robochoc.view.drawing import commands
 from robochoc.view.page import legend
 from robochoc.view.scene import scene_of
 from robochoc.view.walls import blocked_cell_faces
+from tests.support.outcomes import outcome_of
 
 TEAM = Team(
     "flying",
@@ -37,9 +38,7 @@ GROUND = GroundMap(6, 4, {"A": (1, 1), "B": (5, 4)}, scale=0.5, volume=VOLUME)
 
 
 def outcome(a: int, b: int) -> Outcome:
-    return Outcome(
-        Verdict.SOLUTION, team="flying", protocol="abt", runtime="simulator", seed=0, assignment={"A.z": a, "B.z": b}
-    )
+    return outcome_of({"A.z": a, "B.z": b}, team="flying")
 
 
 def test_drones_are_in_the_air_in_the_beginning_where_the_map_says() -> None:

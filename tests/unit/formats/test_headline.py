@@ -7,10 +7,11 @@ from decimal import Decimal
 from typing import Any
 
 from robochoc.formats.headline import describe_outcome
-from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
+from robochoc.model.outcome import EpochOutcome, Verdict
 from tests.support.cases import looped
+from tests.support.outcomes import outcome_of
 
-SOLVED = Outcome(Verdict.SOLUTION, team="team", protocol="abt", runtime="simulator", seed=0, assignment={"V1": 1})
+SOLVED = outcome_of({"V1": 1}, team="team")
 SIX = tuple(f"Robot{number}" for number in range(6))
 EPOCHS = (
     EpochOutcome(Verdict.SOLUTION, robots=SIX, assignment={"V1": 1}),

@@ -9,10 +9,11 @@ import pytest
 
 from robochoc.formats import read_team, write_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.model.outcome import Metrics, Outcome, Verdict
+from robochoc.model.outcome import Metrics, Verdict
 from robochoc.run import Options, Runtime, solve
 from tests.support.flights import scene_of
 from tests.support.limits import HANG_S
+from tests.support.outcomes import outcome_of
 from tests.support.program import robochoc_within
 
 
@@ -75,16 +76,7 @@ def test_a_robot_takes_its_whole_row_from_the_scene(tmp_path: Path) -> None:
 def test_the_scene_counts_drones_and_not_the_robots_that_fly_several() -> None:
     placed = {f"V1.{column}": level for column, level in enumerate((2, 4, 1, 3), 1)}
     aside = ("Robot2", "Robot3", "Robot4")
-    told = Outcome(
-        Verdict.SOLUTION,
-        team="four",
-        protocol="abt",
-        runtime="simulator",
-        seed=0,
-        assignment=placed,
-        withdrawn=aside,
-        metrics=Metrics(),
-    )
+    told = outcome_of(placed, team="four", withdrawn=aside, metrics=Metrics())
     scene = scene_of(told, queens3d(4, robots="rows"))
     assert scene.title == "four: 4 of 16 fly (not proven to be the best)"
     assert scene.facts[0] == ("verdict", "no solution for all 16")

@@ -17,6 +17,7 @@ from robochoc.model.problem import Domain, Robot, Team, Topic, Variable
 from robochoc.view.drawing import commands
 from robochoc.view.page import legend
 from robochoc.view.scene import DrawnBlock, scene_of
+from tests.support.outcomes import outcome_of
 
 ROBOTS = tuple(
     Robot(
@@ -37,15 +38,7 @@ def outcome(*places: tuple[int, int]) -> Outcome:
     values = [{"A.x": a, "B.x": b, "Idle.slot": 2} for a, b in places]
     names = ("A", "B", "Idle")
     epochs = tuple(EpochOutcome(Verdict.SOLUTION, robots=names, assignment=one) for one in values)
-    return Outcome(
-        Verdict.SOLUTION,
-        team="walled",
-        protocol="abt",
-        runtime="simulator",
-        seed=0,
-        assignment=values[-1],
-        epochs=epochs,
-    )
+    return outcome_of(values[-1], team="walled", epochs=epochs)
 
 
 def test_robots_begin_where_they_stand_and_who_has_no_waypoint_stays_there() -> None:

@@ -23,6 +23,7 @@ from robochoc.run.incumbent import best_known, costs_by_cycle, lower_bound, pseu
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.verification.objective import Objective, withdrawal_cost
 from tests.support.cost_problems import cost_of, random_complex_cost_team, random_cost_team, with_costs
+from tests.support.outcomes import outcome_of
 from tests.support.problems import team_of
 
 PRICES = Relation("price", 2, Semantics.SOFT, ((1, 1), (1, 2), (2, 1)), (4, 3, INFINITE), 7)
@@ -180,18 +181,7 @@ def aside(verdict: Verdict, *weights: int, **known: Any) -> str:  # noqa: ANN401
     """What is told when RB of a hard team has stepped aside."""
     hard = team_of({"A": (1,), "B": (1,)}, [])
     robots = tuple(replace(robot, weight=weight) for robot, weight in zip(hard.robots, weights, strict=True))
-    outcome = Outcome(
-        verdict,
-        team="t",
-        protocol="sfb",
-        runtime="simulator",
-        seed=0,
-        assignment={"A": 1},
-        cost=0,
-        withdrawn=("RB",),
-        verified=True,
-        **known,
-    )
+    outcome = outcome_of({"A": 1}, verdict, protocol="sfb", cost=0, withdrawn=("RB",), verified=True, **known)
     return outcome_report(replace(hard, robots=robots), outcome)
 
 
@@ -206,17 +196,7 @@ def test_weights_are_told_where_they_are_not_all_one() -> None:
 def test_a_limit_is_told_with_the_best_so_far_and_the_bound() -> None:
     told = aside(Verdict.UNKNOWN, 1, 3, reason="the time was over", bound=2)
     assert "unknown: the time was over; in the best answer so far 1 withdraws (weight 3) (lower bound 2)" in told
-    outcome = Outcome(
-        Verdict.UNKNOWN,
-        team="t",
-        protocol="afb",
-        runtime="simulator",
-        seed=0,
-        assignment={"A": 1, "B": 2},
-        cost=2**60 + 1,
-        reason="so",
-        bound=3,
-    )
+    outcome = outcome_of({"A": 1, "B": 2}, Verdict.UNKNOWN, protocol="afb", cost=2**60 + 1, reason="so", bound=3)
     assert f"so; the best so far costs {2**60 + 1:,}, and lower bound 3" in outcome_report(PAIR, outcome)
 
 
@@ -226,33 +206,14 @@ def test_who_placed_the_robots_is_told_where_that_was_not_asked_for() -> None:
 
 
 def test_what_is_not_proven_says_so() -> None:
-    outcome = Outcome(
-        Verdict.SOLUTION,
-        team="t",
-        protocol="dsa",
-        runtime="simulator",
-        seed=0,
-        assignment={"A": 1, "B": 2},
-        cost=3,
-        verified=True,
-    )
+    outcome = outcome_of({"A": 1, "B": 2}, protocol="dsa", cost=3, verified=True)
     assert "solution for all 2 robots, cost 3 (not proven to be the minimum), checked" in outcome_report(PAIR, outcome)
 
 
 def test_where_the_sum_is_maximised_the_best_is_a_maximum_and_bounds_are_upper_ones() -> None:
     robots = tuple(replace(robot, costs=CostUnits(maximize=True)) for robot in PAIR.robots)
     team = replace(PAIR, robots=robots)
-    found = Outcome(
-        Verdict.SOLUTION,
-        team="t",
-        protocol="dsa",
-        runtime="simulator",
-        seed=0,
-        assignment={"A": 1, "B": 2},
-        cost=3,
-        verified=True,
-        bound=9,
-    )
+    found = outcome_of({"A": 1, "B": 2}, protocol="dsa", cost=3, verified=True, bound=9)
     assert "cost 3 (not proven to be the maximum), checked" in outcome_report(team, found)
     timely = replace(found, deadline=2)
     assert "by the deadline of 2 s (not proven to be the maximum; upper bound 9), checked" in outcome_report(

@@ -32,6 +32,7 @@ from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.flights import FPS, LEG_S, TILT, commands_of, epochs_of_three, five, straight
 from tests.support.flights import scene_of as flown_scene_of
+from tests.support.outcomes import outcome_of
 from tests.support.program import robochoc_within
 
 HOSTILE = "</script><img src=x onerror=alert(1)>"
@@ -126,14 +127,7 @@ def test_the_page_plays_what_was_flown() -> None:
 
 
 def test_metres_are_shown_in_cells() -> None:
-    outcome = Outcome(
-        Verdict.SOLUTION,
-        team="vast",
-        protocol="abt",
-        runtime="simulator",
-        seed=0,
-        assignment={"V1.1": 1, "V1.2": 10**9, "V2.1": 5 * 10**8},
-    )
+    outcome = outcome_of({"V1.1": 1, "V1.2": 10**9, "V2.1": 5 * 10**8}, team="vast")
     mission = mission_of(outcome)
     scene = scene_of(outcome, mission, straight(mission))
     assert scene.playback
@@ -145,14 +139,7 @@ def test_metres_are_shown_in_cells() -> None:
 
 
 def test_vast_numbers_are_flown_as_they_are_drawn() -> None:
-    outcome = Outcome(
-        Verdict.SOLUTION,
-        team="vast",
-        protocol="abt",
-        runtime="simulator",
-        seed=0,
-        assignment={"V1.1": -1000, "V1.2": 10**12},
-    )
+    outcome = outcome_of({"V1.1": -1000, "V1.2": 10**12}, team="vast")
     scene = flown_scene_of(outcome)
     assert scene.playback
     for drone, end in zip(scene.drones, scene.playback.positions[-1], strict=True):
@@ -174,7 +161,7 @@ def test_each_epoch_says_what_opened_it_and_what_came_of_it() -> None:
 
 
 def test_nobody_flies_where_there_never_was_a_solution() -> None:
-    outcome = Outcome(Verdict.NO_SOLUTION, team="t", protocol="abt", runtime="simulator", seed=0, assignment={})
+    outcome = outcome_of({}, Verdict.NO_SOLUTION)
     assert playback_in(scene_page(shown(outcome)))["chapters"] == [
         {"at": 0, "opened": "the start", "says": "no solution, no drone flies"}
     ]
@@ -363,9 +350,7 @@ def test_equal_flights_make_equal_pages() -> None:
 @pytest.mark.parametrize(("n", "most"), [(4, 1_200_000), (9, 2_000_000)])
 def test_pages_of_large_teams_are_small(n: int, most: int) -> None:
     places = {f"V{i}.{j}": (3 * i + 5 * j) % n + 1 for i in range(1, n + 1) for j in range(1, n + 1)}
-    scene = flown_scene_of(
-        Outcome(Verdict.SOLUTION, team="t", protocol="abt", runtime="simulator", seed=0, assignment=places)
-    )
+    scene = flown_scene_of(outcome_of(places))
     html = scene_page(scene)
     assert len(html) < most
     assert len(tracks_of(html)) >= n * n
@@ -407,7 +392,7 @@ def test_animate_refuses_a_team_whose_robots_are_others(tmp_path: Path) -> None:
     [({"V1.1": 1, "V1.2": 10**12}, None), ({"V1.1": 1, "V1.2": 2}, 1e9), ({"V1.1": 10**7, "V1.2": 10**7 + 1}, None)],
 )
 def test_what_is_flown_in_cells_is_said_not_to_be_to_scale(values: dict[str, int], scale: float | None) -> None:
-    outcome = Outcome(Verdict.SOLUTION, team="vast", protocol="abt", runtime="simulator", seed=0, assignment=values)
+    outcome = outcome_of(values, team="vast")
     scene = flown_scene_of(outcome, mission=mission_of(outcome, None, scale))
     facts = dict(scene.facts)
     assert scene.playback
@@ -420,16 +405,6 @@ def test_more_epochs_than_are_flown_for_a_picture() -> None:
     many = tuple(
         EpochOutcome(Verdict.SOLUTION, robots=(), assignment={"V1.1": number % 3 + 1}) for number in range(100)
     )
-    scene = flown_scene_of(
-        Outcome(
-            Verdict.SOLUTION,
-            team="many",
-            protocol="dynabt",
-            runtime="simulator",
-            seed=0,
-            assignment={"V1.1": 1},
-            epochs=many,
-        )
-    )
+    scene = flown_scene_of(outcome_of({"V1.1": 1}, team="many", protocol="dynabt", epochs=many))
     assert scene.playback is None
     assert dict(scene.facts)["flight"].startswith("none: 1 drone in 100 epochs")

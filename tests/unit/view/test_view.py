@@ -22,6 +22,7 @@ from robochoc.view.page import scene_page
 from robochoc.view.scene import DrawnDrone, Scene
 from tests.support.cases import looped
 from tests.support.flights import commands_of, scene_of, straight
+from tests.support.outcomes import outcome_of
 
 HOSTILE = "</script><img src=x onerror=alert(1)>/../__proto__"
 
@@ -34,16 +35,7 @@ def flown_straight(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def outcome(assignment: Mapping[str, int], verdict: Verdict = Verdict.SOLUTION, *withdrawn: str) -> Outcome:
     metrics = Metrics(messages={"Ok": 1200, "Nogood": 34})
-    return Outcome(
-        verdict,
-        team="a team",
-        protocol="abt",
-        runtime="simulator",
-        seed=0,
-        assignment=dict(assignment),
-        withdrawn=withdrawn,
-        metrics=metrics,
-    )
+    return outcome_of(dict(assignment), verdict, team="a team", withdrawn=withdrawn, metrics=metrics)
 
 
 def robot(name: str, *variables: str, topics: tuple[Topic, ...] = ()) -> Robot:
