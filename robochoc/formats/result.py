@@ -21,7 +21,17 @@ from typing import Any, NoReturn
 
 import msgspec
 
-from robochoc.model.outcome import Answer, CheckCounts, FrontPoint, Improvement, Metrics, Optima, Outcome, SearchStage
+from robochoc.model.outcome import (
+    Answer,
+    CheckCounts,
+    FrontPoint,
+    GridSearch,
+    Improvement,
+    Metrics,
+    Optima,
+    Outcome,
+    SearchStage,
+)
 from robochoc.model.real import MOST_PLACES
 from robochoc.system.decode_errors import describe_decode_error
 from robochoc.system.errors import RobochocError
@@ -99,7 +109,7 @@ def _in_json(name: str, value: Any, outcome: Outcome) -> Any:  # noqa: ANN401, C
         case Improvement():
             found = {key: _in_json(key, one, outcome) for key, one in value._asdict().items()}
             return {"seconds": found.pop("at_s"), **found}
-        case CheckCounts() | FrontPoint() | Optima() | SearchStage():
+        case CheckCounts() | FrontPoint() | GridSearch() | Optima() | SearchStage():
             return {key: _in_json(key, one, outcome) for key, one in value._asdict().items()}
         case Mapping():
             if name == "assignment":
@@ -202,10 +212,9 @@ def _outcome_fields(result: Any) -> Any:  # noqa: ANN401 - JSON
             _answer_fields(one, symbols) | {"metrics": _metrics_fields(one)} if isinstance(one, dict) else one
             for one in epochs
         ]
-    if isinstance(stages := result.get("stages"), list):
-        found["stages"] = [
-            [one.get(name) for name in SearchStage._fields] if isinstance(one, dict) else one for one in stages
-        ]
+    for key, kind in (("stages", SearchStage), ("grids", GridSearch)):
+        if isinstance(listed := result.get(key), list):
+            found[key] = [[one.get(name) for name in kind._fields] if isinstance(one, dict) else one for one in listed]
     if "metrics" in result:
         found["metrics"] = _metrics_fields(result["metrics"])
     return found | {"symbols": [*symbols.codes], "symbolic": [*symbols.variables]}  # after all values were read

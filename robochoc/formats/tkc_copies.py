@@ -15,7 +15,7 @@ from robochoc.formats.costs import cost_text
 from robochoc.formats.diagnostics import Diagnostic, shortened
 from robochoc.formats.team_members import TeamMembers
 from robochoc.model.cost_units import CostUnits
-from robochoc.model.expression import Apply, Constant, Expression, Name, UndefinedValueError, compile_expression
+from robochoc.model.expression import UndefinedValueError, compile_expression
 from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Domain, Function, Relation, Robot
 
 MAX_COMPARED = 1_000_000
@@ -65,29 +65,8 @@ def _content(group: Iterable[Constraint]) -> Counter[Hashable]:
             key = definition.semantics, definition.default_cost, constraint.parameters, tuples
             contents[*key, constraint.objective] += 1
         else:
-            contents[type(definition), _applied(constraint), constraint.cost, constraint.objective] += 1
+            contents[type(definition), constraint.applied, constraint.cost, constraint.objective] += 1
     return contents
-
-
-def _applied(constraint: Constraint) -> Expression:
-    """Return the body of a predicate or function with the actual variables and constants."""
-    if isinstance(constraint.definition, Relation):
-        raise TypeError("a relation has no body")
-    terms: dict[str, Expression] = {
-        formal: Name(term) if isinstance(term, str) else Constant(term)
-        for formal, term in zip(constraint.definition.parameters, constraint.parameters, strict=True)
-    }
-
-    def replaced(expression: Expression) -> Expression:
-        match expression:
-            case Name(name):
-                return terms[name]
-            case Apply(operator, arguments):
-                return Apply(operator, tuple(map(replaced, arguments)))
-            case Constant():
-                return expression
-
-    return replaced(constraint.definition.body)
 
 
 def _difference(
@@ -132,7 +111,7 @@ def _cost_function(
     if isinstance(definition, Relation):
         slots = [(variables.index(term), 0) if isinstance(term, str) else (-1, term) for term in constraint.parameters]
         return lambda values: definition.cost([values[slot] if slot >= 0 else constant for slot, constant in slots])
-    value = compile_expression(_applied(constraint), variables)
+    value = compile_expression(constraint.applied, variables)
     one: int = 10 ** (units.places - definition.places) if isinstance(definition, Function) else 1
 
     def price(values: tuple[int, ...]) -> float:

@@ -13,7 +13,7 @@ from enum import StrEnum
 from functools import cached_property
 from typing import assert_never
 
-from robochoc.model.expression import Expression, UndefinedValueError, evaluate
+from robochoc.model.expression import Constant, Expression, Name, UndefinedValueError, evaluate, with_arguments
 from robochoc.model.real import RealInterval, RealParameters
 from robochoc.system.lazy_dataclass import dataclass
 
@@ -278,6 +278,18 @@ class Constraint:
                 return False
             case never:
                 assert_never(never)
+
+    @property
+    def applied(self) -> Expression:
+        """The body of the predicate or function, over the constraint's variables.
+
+        Raises:
+            TypeError: if the constraint is a relation, which has no body.
+        """
+        if isinstance(self.definition, Relation):
+            raise TypeError("a relation has no body")
+        terms = (Name(term) if isinstance(term, str) else Constant(term) for term in self.parameters)
+        return with_arguments(self.definition.body, dict(zip(self.definition.parameters, terms, strict=True)))
 
     def price(self, assignment: Assignment) -> float:
         """Return the cost of `assignment`, which must contain the scope. 0: the constraint is satisfied."""

@@ -123,6 +123,20 @@ class SearchStage(NamedTuple):
     cost: Cost | None
 
 
+class GridSearch(NamedTuple):
+    """A search on grids of real variables (`run/refinement.py`).
+
+    Attributes:
+        step: The largest distance between neighbouring points of a grid.
+        verdict: The verdict on these grids.
+        cost: The cost of the best assignment on these grids (None: none is known).
+    """
+
+    step: float
+    verdict: Verdict
+    cost: Cost | None
+
+
 CENTRAL_SOLVER = "the central solver"
 """The name in `confirmed_by` for ACE, including the checks made before ACE is called."""
 ALL_ROBOTS = "all robots"
@@ -346,6 +360,7 @@ class Outcome(Answer):
         real_places: The decimal places of variables whose values are real numbers: an integer 1500 with 3 is 1.5.
         chosen: The reasons for the choice of `protocol` and `order`, if they were not specified.
         stages: The stages of the run, if several protocols have searched in turn.
+        grids: The searches on finer and finer grids, if the team has real variables.
         uncertainty: The policy and its costs, if the problem has random variables.
     """
 
@@ -366,6 +381,7 @@ class Outcome(Answer):
     real_places: dict[str, int] = field(default_factory=dict)
     chosen: dict[str, str] = field(default_factory=dict)
     stages: tuple[SearchStage, ...] = ()
+    grids: tuple[GridSearch, ...] = ()
     uncertainty: PolicyReport | None = None
 
     def __hash__(self) -> int:

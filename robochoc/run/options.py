@@ -176,6 +176,8 @@ class Options:
             knowledge in any case.
         stages: The protocols that search in turn until the deadline, of which `protocol` is the last (empty: only
             `protocol` searches). They are chosen, not given.
+        refine: The step of the finest grids of real variables, in their unit (None: the precision; infinite: the grids
+            of the files are not refined).
         risk: The optimised cost of a problem with random variables.
         bounds: True if events report lower bounds of the cost that robots have proven (processes and simulator).
         objectives: The treatment of several objectives: an `ObjectivesMode`, or its text. None: `pareto`, if the
@@ -218,6 +220,7 @@ class Options:
     start: Mapping[str, int | None] = field(default_factory=dict)
     cold: bool = False
     stages: tuple[Stage, ...] = ()
+    refine: float | None = None
     risk: Risk = Risk.EXPECTED
     objectives: ObjectivesMode | None = None
 
@@ -300,6 +303,7 @@ _CONVERTERS = MappingProxyType(
         "cluster": optional(text),
         "start": start_values,
         "cold": flag,
+        "refine": optional(real),
         "risk": one_of(Risk),
         "objectives": optional(objectives),
         "stages": items_of(instance_of(Stage), "objects of the class Stage"),

@@ -29,6 +29,7 @@ from robochoc.run.defaults import CENTRAL
 from robochoc.run.distributed import solve_distributed
 from robochoc.run.improvement import Audience
 from robochoc.run.options import Options
+from robochoc.run.refinement import numbered, refines, solve_on_grids, without_proof
 from robochoc.run.registry import protocol_named
 from robochoc.run.scenario import Environment
 from robochoc.run.this_machine import ThisMachine
@@ -116,21 +117,20 @@ class PreparedRun:
         audience: Audience | None = None,
     ) -> Outcome:
         """Run the search and return its outcome. For the arguments and errors see the function `solve`."""
-        team, options = self.team, self.choice.options
-        context = RunContext(options, observer, progress, solver, self.spent_s)
         environment = environment and with_checked_events(environment)
-        try:
-            counted = normalized(team)
-            if options.protocol == CENTRAL:
-                outcome = _solve_centrally(counted, context)
-            else:
-                outcome = _solve_distributed(counted, context, environment, audience)
-        except (OrderError, NormalizationError) as refused:
-            raise UnsupportedError(str(refused)) from None
-        if counted is not team and environment is None:
-            _check_costs(team, outcome)
+        if environment is None and not (self.uncertain or self.combined) and refines(self.team, self.choice.options):
+            began = time.monotonic() - self.spent_s
+
+            def solve_grid(team: Team, options: Options, number: int, opened_by: str) -> Outcome:
+                spent_s = time.monotonic() - began
+                context = RunContext(options, numbered(observer, number, opened_by), progress, solver, spent_s)
+                return _solved(team, context, None, audience)
+
+            return solve_on_grids(self.team, self.choice.options, solve_grid)
+        context = RunContext(self.choice.options, observer, progress, solver, self.spent_s)
+        outcome = without_proof(self.team, _solved(self.team, context, environment, audience))
         if self.uncertain and outcome.assignment and not outcome.epochs:
-            return replace(outcome, uncertainty=policy_report(self.uncertain, outcome, options.risk))
+            return replace(outcome, uncertainty=policy_report(self.uncertain, outcome, self.choice.options.risk))
         return outcome if self.combined is None else self.combined.outcome(outcome)
 
 
@@ -178,6 +178,21 @@ def _worst_case(team: Team) -> Team:
         return worst_case(team)
     except UncertaintyError as refused:
         raise UnsupportedError(str(refused)) from None
+
+
+def _solved(team: Team, context: RunContext, environment: Environment | None, audience: Audience | None) -> Outcome:
+    """Run the search for `team` on the present grids of its real variables, and return its outcome."""
+    try:
+        counted = normalized(team)
+        if context.options.protocol == CENTRAL:
+            outcome = _solve_centrally(counted, context)
+        else:
+            outcome = _solve_distributed(counted, context, environment, audience)
+    except (OrderError, NormalizationError) as refused:
+        raise UnsupportedError(str(refused)) from None
+    if counted is not team and environment is None:
+        _check_costs(team, outcome)
+    return outcome
 
 
 def _check_costs(team: Team, outcome: Outcome) -> None:

@@ -12,9 +12,9 @@ from collections.abc import Mapping, Sequence
 from typing import Literal, assert_never
 
 from robochoc.model.constraint import Constraint, Predicate
-from robochoc.model.expression import Apply, Constant, Expression, Name
+from robochoc.model.expression import Apply, Constant, Expression, Name, with_arguments
 from robochoc.model.expression.bounds import Interval
-from robochoc.solver.splitting import collect_terms, largest_value, with_arguments
+from robochoc.solver.splitting import collect_terms, largest_value
 from robochoc.system.lazy_dataclass import dataclass
 
 LARGEST = 2**29

@@ -24,6 +24,7 @@ from robochoc.model.expression import (
     UndefinedValueError,
     compile_expression,
     names,
+    with_arguments,
 )
 from robochoc.model.expression.bounds import Interval, bounds
 from robochoc.model.expression.tree import BOUND
@@ -303,17 +304,6 @@ def _folded(operator: str, parts: Sequence[Expression]) -> Expression:
 
 def _times(term: Expression, factor: int) -> Expression:
     return term if factor == 1 else Apply("mul", (Constant(factor), term))
-
-
-def with_arguments(expression: Expression, actual: Mapping[str, Expression]) -> Expression:
-    """Return `expression` with its names replaced by `actual` expressions."""
-    match expression:
-        case Name(name):
-            return actual[name]
-        case Apply(operator, arguments):
-            return Apply(operator, tuple(with_arguments(argument, actual) for argument in arguments))
-        case Constant():
-            return expression
 
 
 def _may_be_undefined(expression: Expression) -> bool:

@@ -55,7 +55,7 @@ def outcome_report(team: Team, outcome: Outcome, ground: GroundMap | None = None
     if outcome.lost:
         lost = sorted(outcome.lost, key=natural_key)
         lines += [f"  {len(lost)} lost:", *_wrapped(lost)]
-    lines += [*_dropped(outcome), *_chosen(outcome), *_stages(outcome), *_preprocessing(outcome)]
+    lines += [*_dropped(outcome), *_chosen(outcome), *_stages(outcome), *_grids(outcome), *_preprocessing(outcome)]
     order = f", order {outcome.order}" if outcome.order else ""
     lines.append(f"  {outcome.protocols}{order}, {_place(team, outcome)}: {_metrics(outcome)}{_simulated(outcome)}")
     return "\n".join(map(on_one_line, lines))
@@ -119,6 +119,15 @@ def _stages(outcome: Outcome) -> list[str]:
         cost = "" if stage.cost is None else f": {_number(stage.cost)}"
         words.append(f"{stage.protocol} {stage.seconds:.2f} s{searches}{cost}")
     return [f"  stages: {'; '.join(words)}"]
+
+
+def _grids(outcome: Outcome) -> list[str]:
+    """Return a line about the grids of real variables, if there are any."""
+    if not outcome.grids:
+        return []
+    first, last = outcome.grids[0], outcome.grids[-1]
+    costs = f", cost {_number(first.cost)} to {_number(last.cost)}" if first.cost is not None else ""
+    return [f"  {counted(len(outcome.grids), 'grid')}: step {first.step:g} to {last.step:g}{costs}"]
 
 
 def _preprocessing(outcome: Outcome) -> list[str]:
@@ -228,6 +237,9 @@ def _not_proven(team: Team, outcome: Outcome) -> str:
     by = _by_the_deadline(outcome)
     if known:
         return by
+    if outcome.grids and outcome.cost is not None and outcome.bound is not None:
+        gap, bound = abs(Decimal(outcome.cost) - Decimal(outcome.bound)), _number(outcome.bound)
+        return f"{by} (at most {_number(gap)} from the {_best(team)}: {_side(team)} bound {bound})"
     bound = f"; {_side(team)} bound {_number(outcome.bound)}" if by and outcome.bound else ""
     return f"{by} (not proven to be the {_best(team)}{bound})"
 

@@ -22,6 +22,7 @@ from robochoc.model.expression.tree import (
     names,
     text,
     total,
+    with_arguments,
 )
 
 __all__ = [
@@ -42,4 +43,5 @@ __all__ = [
     "parse",
     "text",
     "total",
+    "with_arguments",
 ]

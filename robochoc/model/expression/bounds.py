@@ -34,7 +34,10 @@ def bounds(expression: Expression, limits: Mapping[str, Interval]) -> Interval:
             return Interval(value, value)
         case Name(name):
             return limits[name]
-        case Apply("if", (_, then, otherwise)):
+        case Apply("if", (condition, then, otherwise)):
+            low, high = bounds(condition, limits)
+            if low == high:
+                return bounds(then if low else otherwise, limits)
             return _hull(bounds(then, limits), bounds(otherwise, limits))
         case Apply(operator, arguments):
             return _applied(operator, [bounds(argument, limits) for argument in arguments])
@@ -88,7 +91,7 @@ def _steps(operator: str, parts: list[Interval]) -> Iterator[Interval]:
 def _applied(operator: str, parts: list[Interval]) -> Interval:
     if operator in _BOUNDS:
         return _BOUNDS[operator](*parts)
-    return Interval(0, 1)  # all other operators are Boolean
+    return _UNCERTAIN  # all other operators are Boolean
 
 
 def _sum(*parts: Interval) -> Interval:
@@ -103,9 +106,18 @@ def _product(*parts: Interval) -> Interval:
     return reduce(_product_of_two, parts)
 
 
-def _quotient(dividend: Interval, divisor: Interval) -> Interval:  # noqa: ARG001 - at least 1 or at most -1
+def _quotient(dividend: Interval, divisor: Interval) -> Interval:
+    """Return the bounds of a truncated quotient. Its divisor is at least 1 or at most -1."""
     size = _absolute(dividend).high
-    return Interval(-size, size)
+    if divisor.low <= 0 <= divisor.high or any(end in _INFINITE for end in (*dividend, *divisor)):
+        return Interval(-size, size)
+    ends = [_truncated(int(part), int(by)) for part in dividend for by in divisor]
+    return Interval(min(ends), max(ends))
+
+
+def _truncated(dividend: int, divisor: int) -> int:
+    size = abs(dividend) // abs(divisor)
+    return size if (dividend < 0) == (divisor < 0) else -size
 
 
 def _remainder(dividend: Interval, divisor: Interval) -> Interval:  # noqa: ARG001 - it has the dividend's sign
@@ -158,6 +170,38 @@ def _times(left: float, right: float) -> float:
     return left * right
 
 
+def _truth(*, is_true: bool, is_false: bool) -> Interval:
+    """Return the interval of a Boolean that is certainly true, certainly false, or uncertain."""
+    return Interval(int(is_true), int(not is_false))
+
+
+def _less(left: Interval, right: Interval) -> Interval:
+    return _truth(is_true=left.high < right.low, is_false=left.low >= right.high)
+
+
+def _all_equal(*parts: Interval) -> Interval:
+    lowest, highest = min(part.low for part in parts), max(part.high for part in parts)
+    is_false = max(part.low for part in parts) > min(part.high for part in parts)
+    return _truth(is_true=lowest == highest, is_false=is_false)
+
+
+def _is_in(part: Interval, *members: Interval) -> Interval:
+    return _greatest(*(_all_equal(part, member) for member in members))
+
+
+def _negation(part: Interval) -> Interval:
+    return Interval(1 - part.high, 1 - part.low)
+
+
+def _least(*parts: Interval) -> Interval:
+    return Interval(min(part.low for part in parts), min(part.high for part in parts))
+
+
+def _greatest(*parts: Interval) -> Interval:
+    return Interval(max(part.low for part in parts), max(part.high for part in parts))
+
+
+_UNCERTAIN = Interval(0, 1)
 _MAX_BITS = 4096
 _INFINITE = (math.inf, -math.inf)
 
@@ -168,10 +212,22 @@ _BOUNDS: dict[str, Callable[..., Interval]] = {
     "sub": _difference,
     "dist": lambda left, right: _absolute(_difference(left, right)),
     "mul": _product,
-    "min": lambda *parts: Interval(min(part.low for part in parts), min(part.high for part in parts)),
-    "max": lambda *parts: Interval(max(part.low for part in parts), max(part.high for part in parts)),
+    "min": _least,
+    "max": _greatest,
     "div": _quotient,
     "mod": _remainder,
     "sqr": _square,
     "pow": _power,
+    "eq": _all_equal,
+    "ne": lambda left, right: _negation(_all_equal(left, right)),
+    "lt": _less,
+    "le": lambda left, right: _negation(_less(right, left)),
+    "gt": lambda left, right: _less(right, left),
+    "ge": lambda left, right: _negation(_less(left, right)),
+    "in": _is_in,
+    "not": _negation,
+    "and": _least,
+    "or": _greatest,
+    "iff": _all_equal,
+    "imp": lambda condition, consequence: _greatest(_negation(condition), consequence),
 }

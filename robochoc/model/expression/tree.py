@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from enum import StrEnum
 
 from robochoc.system.errors import RobochocError
@@ -106,6 +106,17 @@ def text(expression: Expression, symbolic: Collection[str] = (), symbols: Sequen
 
 def _is_in(expression: Expression, names: Collection[str]) -> bool:
     return isinstance(expression, Name) and expression.name in names
+
+
+def with_arguments(expression: Expression, actual: Mapping[str, Expression]) -> Expression:
+    """Return `expression` with its names replaced by `actual` expressions."""
+    match expression:
+        case Name(name):
+            return actual[name]
+        case Apply(operator, arguments):
+            return Apply(operator, tuple(with_arguments(argument, actual) for argument in arguments))
+        case Constant():
+            return expression
 
 
 def names(expression: Expression) -> tuple[str, ...]:

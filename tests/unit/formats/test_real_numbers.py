@@ -89,7 +89,7 @@ def test_results_contain_numbers_and_are_read_back(tmp_path: Path) -> None:
     team = _team(tmp_path / "t")
     outcome = solve(team, Options(protocol="afb", runtime=Runtime.SIMULATOR))
     written = result_json(outcome)
-    assert b'"x":2.5,"y":4.75' in written
+    assert b'"x":2.5,"y":5.5' in written
     assert read_result(written).assignment == outcome.assignment
     assert outcome.labelled(outcome.assignment)["x"] == 2.5
 

@@ -1,0 +1,269 @@
+"""Lower bounds of the cost of teams with real variables, by branch and bound over boxes of values.
+
+The bound of a box is the best of three: interval arithmetic, the mean value form (Moore, "Interval Analysis", 1966),
+and, if the costs are convex, a tangent at the known assignment, which needs no small boxes. All numbers are exact.
+Independent parts of the team are bounded separately. The module shares no code with the protocols and solvers.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import math
+from collections.abc import Collection, Mapping, Sequence
+from typing import NamedTuple
+
+from robochoc.model.constraint import INFINITE, Constraint, Function, Predicate, Relation
+from robochoc.model.cost_units import Cost, common_units
+from robochoc.model.expression import Apply, Constant, Expression, UndefinedValueError, evaluate, names
+from robochoc.model.expression.bounds import Interval, bounds
+from robochoc.model.expression.slopes import local_model
+from robochoc.model.magnitudes import extent
+from robochoc.model.problem import Assignment, Team
+
+EVALUATIONS = 40_000
+"""The default maximum number of evaluations of a cost over a box."""
+
+_Box = dict[str, Interval]
+
+
+class Certificate(NamedTuple):
+    """A proven statement on all assignments of a team whose real variables are multiples of the precision.
+
+    Attributes:
+        bound: A bound of the cost in the user's units: no assignment costs less (or is worth more, if costs are
+            maximised). None: no finite bound is known.
+        is_infeasible: True if no assignment satisfies the hard constraints.
+    """
+
+    bound: Cost | None
+    is_infeasible: bool = False
+
+
+class _Cost(NamedTuple):
+    """A cost: `weight` times the value of an expression, which is less than `slack` away from the true cost."""
+
+    body: Expression
+    weight: int
+    slack: int = 0
+
+
+class _Problem(NamedTuple):
+    """A part of a team that shares no variables with the other parts. Costs are minimised.
+
+    Attributes:
+        box: The intervals of its variables.
+        costs: The costs over these variables.
+        hard: The hard predicates.
+        least: A lower bound of the costs in relations, which have no expression.
+        restricted: The variables in hard constraints.
+    """
+
+    box: _Box
+    costs: Sequence[_Cost]
+    hard: Sequence[Expression]
+    least: int
+    restricted: Collection[str]
+
+
+class _Open(NamedTuple):
+    """A box that has not been excluded, with its bound and the slopes of the costs."""
+
+    bound: int
+    number: int
+    box: _Box
+    slopes: Mapping[str, Interval]
+
+
+def certificate(team: Team, best: Assignment, evaluations: int = EVALUATIONS) -> Certificate:
+    """Return a bound of the cost of all assignments of `team`, on any grid.
+
+    Args:
+        team: The team, without normalised costs. Robots must not withdraw.
+        best: The best known assignment, or no values.
+        evaluations: The maximum number of evaluations of a cost over a box, for all parts together.
+    """
+    units = common_units(robot.costs for robot in team.robots)
+    sign = -1 if units.maximize else 1
+    finest = math.lcm(*(_divisor(one) for one in team.constraints()))
+    problems = _parts(team, units.places, sign * finest)
+    work = sum(len(problem.costs) + len(problem.hard) for problem in problems) or 1
+    total = 0
+    for problem in problems:
+        bound = _bound(problem, best, evaluations * (len(problem.costs) + len(problem.hard)) // work)
+        if bound is None:
+            return Certificate(None, is_infeasible=True)
+        total += bound
+    return Certificate(units.in_user_units(sign * -(-total // finest)))  # costs are integers: the bound is rounded up
+
+
+def _bound(problem: _Problem, best: Assignment, evaluations: int) -> int | None:
+    """Return a lower bound of the costs; None if the hard constraints cannot be satisfied."""
+    count = itertools.count()
+    known = _cost_at(problem, best) if problem.box.keys() <= best.keys() else None
+    first = _opened(problem, problem.box, best, next(count))
+    if first is None:
+        return None
+    waiting, closed = [first], [] if known is None else [known]
+    while waiting and evaluations > 0 and (known is None or waiting[0].bound < known):
+        one = heapq.heappop(waiting)
+        halves = _halves(one)
+        if not halves:
+            closed.append(one.bound)
+            if known is None:
+                break  # an assignment, of which no bound is lower
+        for half in halves:
+            evaluations -= len(problem.costs) + len(problem.hard) + 1
+            opened = _opened(problem, half, best, next(count))
+            if opened is not None and (known is None or opened.bound < known):
+                heapq.heappush(waiting, opened._replace(bound=max(opened.bound, one.bound)))
+    return min([*(one.bound for one in waiting[:1]), *closed], default=None)
+
+
+def _opened(problem: _Problem, box: _Box, best: Assignment, number: int) -> _Open | None:
+    """Return `box` with its bound; None if it violates a hard constraint everywhere.
+
+    Where the costs only rise or fall with a variable without hard constraints, only its better end remains.
+    """
+    if any(bounds(body, box).high == 0 for body in problem.hard):
+        return None
+    point = {name: _nearest(best.get(name), part) for name, part in box.items()}
+    intervals: float = problem.least
+    tangents, means = intervals, intervals
+    slopes: dict[str, Interval] = {}
+    gradient: dict[str, Interval] = {}
+    steep: set[str] = set(problem.restricted)
+    for cost in problem.costs:
+        model = local_model(cost.body, box, point)
+        low = _product(bounds(cost.body, box) if model is None else model.range, cost.weight).low - cost.slack
+        intervals += low
+        if model is None:
+            tangents, means = tangents + low, means + low
+            steep.update(names(cost.body))
+            continue
+        at = cost.weight * model.value - cost.slack
+        means += at
+        _add(slopes, model.slopes, cost.weight)
+        if model.convex if cost.weight > 0 else model.concave:
+            tangents += at
+            _add(gradient, {name: Interval(one, one) for name, one in model.gradient.items()}, cost.weight)
+        else:
+            tangents += low
+    means += sum(_descent(slope, box[name], point[name]) for name, slope in slopes.items())
+    tangents += sum(_descent(slope, box[name], point[name]) for name, slope in gradient.items())
+    left = {name: part if name in steep else _better_end(part, slopes.get(name)) for name, part in box.items()}
+    return _Open(int(max(intervals, means, tangents)), number, left, slopes)
+
+
+def _nearest(value: int | None, part: Interval) -> int:
+    """Return the value nearest to `value` in an interval, or its centre if there is no value."""
+    low, high = int(part.low), int(part.high)
+    return (low + high) // 2 if value is None else min(max(value, low), high)
+
+
+def _add(slopes: dict[str, Interval], added: Mapping[str, Interval], weight: int) -> None:
+    for name, slope in added.items():
+        low, high = _product(slope, weight)
+        before = slopes.get(name, _ZERO)
+        slopes[name] = Interval(before.low + low, before.high + high)
+
+
+def _product(part: Interval, weight: int) -> Interval:
+    low, high = sorted((part.low * weight, part.high * weight))
+    return Interval(low, high)
+
+
+def _descent(slope: Interval, part: Interval, at: int) -> float:
+    """Return the greatest descent in an interval from a point in it, as a number of 0 or less."""
+    return min(slope.low * (part.high - at), slope.high * (part.low - at), 0)
+
+
+def _better_end(part: Interval, slope: Interval | None) -> Interval:
+    """Return the end of an interval with the lower cost; the whole interval if the slope has both signs."""
+    if slope is None or slope.low >= 0:
+        return Interval(part.low, part.low)
+    return Interval(part.high, part.high) if slope.high <= 0 else part
+
+
+def _halves(one: _Open) -> list[_Box]:
+    """Return both halves of a box, divided where the costs vary most. A single assignment has no halves."""
+    wide = [name for name, part in one.box.items() if part.low < part.high]
+    if not wide:
+        return []
+
+    def variation(name: str) -> tuple[float, float]:
+        width, slope = one.box[name].high - one.box[name].low, one.slopes.get(name, _ZERO)
+        return width * max(-slope.low, slope.high), width
+
+    name = max(wide, key=variation)
+    low, high = one.box[name]
+    middle = int(low + high) // 2
+    return [{**one.box, name: Interval(low, middle)}, {**one.box, name: Interval(middle + 1, high)}]
+
+
+def _cost_at(problem: _Problem, best: Assignment) -> int | None:
+    """Return the cost of an assignment; None if it is undefined."""
+    try:
+        return problem.least + sum(cost.weight * evaluate(cost.body, best) for cost in problem.costs)
+    except UndefinedValueError:
+        return None
+
+
+def _parts(team: Team, places: int, weight: int) -> list[_Problem]:
+    """Return the independent parts of a team, with costs in units of 10**-`places` times `weight`."""
+    leader: dict[str, str] = {name: name for name in team.variables}
+
+    def found(name: str) -> str:
+        while leader[name] != name:
+            leader[name] = name = leader[leader[name]]
+        return name
+
+    for constraint in team.constraints():
+        first, *others = constraint.variables
+        for other in others:
+            leader[found(other)] = found(first)
+    groups: dict[str, _Problem] = {}
+    for name, variable in team.variables.items():
+        group = groups.setdefault(found(name), _Problem({}, [], [], 0, set()))
+        group.box[name] = extent(variable.domain)
+    for robot in team.robots:
+        unit = weight * 10 ** (places - robot.costs.places)
+        for constraint in robot.constraints():
+            name = found(constraint.variables[0])
+            groups[name] = _with_constraint(groups[name], constraint, unit, places, weight)
+    return [*groups.values()]
+
+
+def _with_constraint(problem: _Problem, constraint: Constraint, unit: int, places: int, weight: int) -> _Problem:
+    """Return `problem` with a constraint, whose costs are multiplied by `unit`, or by `weight` if it is a function."""
+    match constraint.definition:
+        case Relation() as relation:
+            prices = [int(cost) * unit for cost in relation.finite_costs]
+            restricted = {*problem.restricted, *constraint.variables}
+            return problem._replace(least=problem.least + min(prices), restricted=restricted)
+        case Function() as function:
+            factor = weight * 10 ** (places - function.places)
+            match constraint.applied:
+                case Apply("div", (dividend, Constant(divisor))) if divisor > 0:
+                    cost = _Cost(dividend, factor // divisor, abs(factor))
+                case body:
+                    cost = _Cost(body, factor)
+            return problem._replace(costs=[*problem.costs, cost])
+        case Predicate() if constraint.cost == INFINITE:
+            restricted = {*problem.restricted, *constraint.variables}
+            return problem._replace(hard=[*problem.hard, constraint.applied], restricted=restricted)
+        case _:
+            body = Apply("if", (constraint.applied, Constant(0), Constant(int(constraint.cost))))
+            return problem._replace(costs=[*problem.costs, _Cost(body, unit)])
+
+
+def _divisor(constraint: Constraint) -> int:
+    """Return the constant by which the value of a function is divided at last; 1 if there is none."""
+    match constraint.definition:
+        case Function(body=Apply("div", (_, Constant(divisor)))) if divisor > 0:
+            return divisor
+        case _:
+            return 1
+
+
+_ZERO = Interval(0, 0)

@@ -1,0 +1,73 @@
+"""Real variables: finer and finer grids, and bounds that hold for all values."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Team
+from robochoc.run.options import Options, Runtime
+from robochoc.run.orchestrator import solve
+from robochoc.verification.checker import check_user_cost, violations
+from robochoc.verification.real_bound import certificate
+from tests.support.examples import are_the_same, drawn
+from tests.support.real_teams import best_cost, random_team
+
+
+def _check(team: Team, protocol: str) -> tuple[bool, bool]:
+    """Check a run against enumeration. Return whether the answer is proven, and whether it is the best one."""
+    outcome = solve(team, Options(protocol=protocol, runtime=Runtime.SIMULATOR))
+    best = best_cost(team)
+    sign = -1 if team.robots[0].costs.maximize else 1
+    if best is None:
+        assert outcome.verdict in {Verdict.NO_SOLUTION, Verdict.UNKNOWN}
+        return outcome.verdict == Verdict.NO_SOLUTION, True
+    assert outcome.verdict != Verdict.NO_SOLUTION
+    quick = certificate(team, {}, 200).bound
+    assert quick is not None
+    assert sign * quick <= sign * best
+    if outcome.cost is None:
+        return False, False
+    assert not list(violations(_whole(team), outcome.assignment))
+    check_user_cost(team, outcome.assignment, outcome.cost)
+    assert sign * outcome.cost >= sign * best
+    if outcome.verdict == Verdict.OPTIMAL:
+        assert outcome.cost == best
+    else:
+        assert outcome.bound is not None
+        assert sign * outcome.bound <= sign * best
+    return outcome.verdict == Verdict.OPTIMAL, outcome.cost == best
+
+
+def _whole(team: Team) -> Team:
+    """Return `team` with all multiples of the precision in its domains."""
+    robots = []
+    for robot in team.robots:
+        own = []
+        for one in robot.variables:
+            assert one.domain.real
+            ranges = (range(one.domain.real.low, one.domain.real.high + 1),)
+            own.append(replace(one, domain=replace(one.domain, ranges=ranges)))
+        robots.append(replace(robot, variables=tuple(own)))
+    return replace(team, robots=tuple(robots))
+
+
+def test_answers_and_bounds_agree_with_enumeration() -> None:
+    chance = drawn("real teams")
+    for number in range(12):
+        team = random_team(chance, chance.randint(1, 2), 30)
+        _check(team, ["dpop", "afb", "dsa"][number % 3])
+
+
+@pytest.mark.slow
+def test_300_small_teams() -> None:
+    chance = drawn("300 real teams")
+    proven = best = 0
+    for number in range(300):
+        variables = 1 + number % 4
+        is_proven, is_best = _check(random_team(chance, variables, [60, 40, 25, 12][variables - 1]), "dpop")
+        proven, best = proven + is_proven, best + is_best
+    if are_the_same():
+        assert (proven, best) == (288, 295)
