@@ -14,6 +14,7 @@ from typing import Any, get_args, get_type_hints
 from robochoc.generators import agentsnet as agent_tasks
 from robochoc.generators import coloring as colorings
 from robochoc.generators import frequencies as frequency_assignments
+from robochoc.generators import heights as flight_heights
 from robochoc.generators import ising as isings
 from robochoc.generators import meetings as schedules
 from robochoc.generators import nary as nary_problems
@@ -232,6 +233,7 @@ FAMILIES: Mapping[str, Callable[..., Team]] = MappingProxyType(
         "formation": formation,
         "frequencies": frequency_assignments.frequencies,
         "grid-sensors": grid_sensors,
+        "heights": flight_heights.heights,
         "ising": isings.ising,
         "meetings": meetings,
         "nary": nary_problems.nary,

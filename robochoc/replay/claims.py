@@ -188,6 +188,7 @@ def _answer_contradictions(whose: str, recorded: Answer, last: ReplayedRun) -> I
     replayed = last.answer
     if replayed is None or recorded.verdict == Verdict.UNKNOWN:  # a journal does not contain limits
         return
+    recorded = _with_combined_cost(recorded, last.team)
     began = last.run.began
     earlier = bool(recorded.improvements) or (began is not None and began.continues is True)
     has_answer = bool(recorded.assignment or recorded.withdrawn)
@@ -202,6 +203,18 @@ def _answer_contradictions(whose: str, recorded: Answer, last: ReplayedRun) -> I
     left, right = sorted(recorded.withdrawn), sorted(replayed.withdrawn)
     if left != right:
         yield Contradiction(what=whose + "withdrawn", recorded=left, replayed=right)
+
+
+def _with_combined_cost(recorded: Answer, team: Team) -> Answer:
+    """Return the answer with its cost in the robots' team, if its cost is that in one of several objectives.
+
+    The journal has the robots' constraints, whose costs combine the objectives (`solver/objectives.py`).
+    """
+    if recorded.cost not in recorded.objectives.values():
+        return recorded
+    without = recorded.withdrawn
+    cost = user_cost(team, assignment_cost(team, recorded.assignment), without=without)
+    return replace(recorded, cost=cost)
 
 
 def _published_contradictions(whose: str, recorded: Answer, replayed: Answer, team: Team) -> Iterator[Contradiction]:

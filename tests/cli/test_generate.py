@@ -15,6 +15,7 @@ from robochoc.formats import read_team
 from robochoc.generators.coloring import coloring_of
 from robochoc.generators.frequencies import frequencies
 from robochoc.generators.graphs import grid, scale_free, small_world, tree
+from robochoc.generators.heights import heights
 from robochoc.generators.ising import ising
 from robochoc.generators.maps.coverage import coverage
 from robochoc.generators.maps.formation import formation
@@ -60,6 +61,7 @@ FAMILIES: dict[str, Callable[[], Team]] = {
     ),
     "stochastic --agents 5 --domain 3 --observed 0.5": lambda: stochastic(agents=5, domain=3, observed=0.5),
     "frequencies --agents 5 --frequencies 3": lambda: frequencies(agents=5, frequencies=3),
+    "heights --agents 4 --levels 3": lambda: heights(agents=4, levels=3),
     "smart-homes --agents 4 --rules 3 --levels 3": lambda: smart_homes(agents=4, rules=3, levels=3),
     "meetings --agents 3 --meetings 2 --slots 3 --max-length 2": lambda: meetings(3, 2, 2, 3, max_length=2),
     "meetings --agents 3 --meetings 2 --slots 3 --required": lambda: meetings(3, 2, 2, 3, max_value=None),

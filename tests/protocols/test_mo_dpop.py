@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from pathlib import Path
 from random import Random
 
 import pytest
@@ -10,10 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import robochoc
+from robochoc.journal.journal import read_journal
 from robochoc.model.objectives import PARETO, ObjectivesMode, non_dominated, objectives_mode, place_values, unpacked
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
 from robochoc.protocols.inference.mo_dpop import MODPOPSettings
+from robochoc.replay import replay
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.options import ScheduleName
 from robochoc.solver.errors import UnsupportedError
@@ -214,3 +217,9 @@ def test_invalid_bases_are_refused(bases: str) -> None:
 def test_pareto_is_the_mode_without_names() -> None:
     assert PARETO.names == ()
     assert ObjectivesMode(PARETO.combination) == PARETO
+
+
+@pytest.mark.parametrize("mode", ["pareto", "lexicographic:risk,energy", "weighted:energy=2,risk=1"])
+def test_journals_are_replayed(tmp_path: Path, mode: str) -> None:
+    trade_off().solve("mo-dpop", objectives=mode, journal=tmp_path / "run.jsonl")
+    assert not [*replay(read_journal((tmp_path / "run.jsonl").read_bytes())).contradictions]

@@ -57,7 +57,11 @@ def _solve_and_show(
         return failure.exit_code
     for line in publication_lines(loop) if loop and not request.as_json else ():
         click.echo(line, err=True)
-    if outputs.html or outputs.serve:
+    if outputs.html and outcome.front:
+        from robochoc.cli.reports.scene import write_front
+
+        write_front(outcome, team, outputs.html, quiet=request.as_json)
+    elif outputs.html or outputs.serve:
         from robochoc.cli.reports.scene import scene_for, show_scene
 
         ground = problem_map(problem, folder)

@@ -1,4 +1,4 @@
-"""The 3D scene for `robochoc solve`, `fly` and `animate`, as a file or live."""
+"""The 3D scene for `robochoc solve`, `fly` and `animate`, as a file or live; and the page of a Pareto front."""
 
 from __future__ import annotations
 
@@ -49,6 +49,15 @@ def scene_for(
     return scene_of(
         outcome, mission, preview.flown, flown_mission=preview.mission, why_not=preview.why_not, weighted=weighted
     )
+
+
+def write_front(outcome: Outcome, team: Team, path: Path, *, quiet: bool) -> None:
+    """Write the page on which a point of a Pareto front is chosen."""
+    from robochoc.view.front_page import front_page
+
+    write_atomically(path, front_page(outcome, team).encode())
+    if not quiet:
+        click.echo(f"{path}: choose a point of the front in a browser", err=True)
 
 
 def show_scene(scene: Scene, path: Path | None, *, serve: bool, port: int = 0, quiet: bool = False) -> None:

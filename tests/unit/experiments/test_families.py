@@ -18,6 +18,7 @@ EXAMPLES: dict[str, dict[str, int | float | str]] = {
     "formation": {"map": BUILDING, "agents": 2},
     "frequencies": {"agents": 4, "frequencies": 3},
     "grid-sensors": {"rows": 2, "columns": 2, "targets": 1},
+    "heights": {"agents": 3},
     "ising": {"rows": 2, "columns": 2},
     "meetings": {"agents": 3, "meetings": 2, "slots": 3},
     "nary": {"agents": 4, "domain": 2, "constraints": 3},

@@ -1,4 +1,4 @@
-"""`robochoc generate nary`, `stochastic`, `frequencies`, `smart-homes`, `smart-grid`: links, lamps, and chance."""
+"""`robochoc generate nary`, `stochastic`, `frequencies`, `heights`, ...: links, lamps, and chance."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import click
 
 from robochoc.cli.options.generate import OUTPUT, number_option, seed_option, share_option, writes_team
 from robochoc.cli.options.sections import COMMON, SectionedCommand
-from robochoc.cli.options.value_types import WholeNumber
+from robochoc.cli.options.value_types import Number, WholeNumber
 
 if TYPE_CHECKING:
     from robochoc.model.problem import Team
@@ -90,6 +90,33 @@ def frequencies(**problem: Any) -> Team:  # noqa: ANN401 - `frequencies`'s own
     from robochoc.generators.frequencies import frequencies as frequency_assignment
 
     return frequency_assignment(**problem)
+
+
+@click.command(short_help="Flight heights: two objectives, energy and risk.")
+@number_option("--agents", "Number of drones.")
+@number_option("--levels", "Number of heights.", least=2, most=100, default=5)
+@click.option(
+    "--degree",
+    type=Number(0),
+    default=2.0,
+    show_default=True,
+    metavar="N",
+    help="Average number of crossing paths of a drone.",
+)
+@number_option("--weight", "Maximum energy of a drone per height.", most=MAX_COST, default=3)
+@number_option("--exposure", "Maximum exposure of a drone.", most=MAX_COST, default=3)
+@number_option("--crossing", "Maximum risk at neighbouring heights.", most=MAX_COST, default=6)
+@seed_option
+@writes_team("heights-AGENTS-LEVELS-DEGREE-WEIGHT-EXPOSURE-CROSSING-SEED")
+def heights(**problem: Any) -> Team:  # noqa: ANN401 - `heights`'s own
+    """Drones choose heights: low ones save energy, high ones are safe, equal ones are dangerous where paths cross.
+
+    \b
+    robochoc generate heights --agents 8
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
+    from robochoc.generators.heights import heights as flight_heights
+
+    return flight_heights(**problem)
 
 
 @click.command("smart-homes", short_help="Smart lighting: lamps, rules and energy.")
