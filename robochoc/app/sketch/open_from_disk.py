@@ -106,7 +106,13 @@ def open_team(path: Path, *more: Path) -> Sketch | ImportedTeam:
 def _folder(folder: Path) -> Sketch | ImportedTeam:
     xml = _xml_in(folder)
     found = sketch_in(folder, xml)
-    return found if isinstance(found, Sketch) else ImportedTeam(folder, read_team(folder), changed=found)
+    if isinstance(found, Sketch):
+        return found
+    team = read_team(folder)
+    if team.objectives:
+        hint = "use 'robochoc solve --html FILE', whose page shows the Pareto front"
+        raise invalid_input(folder, "the team has several objectives, and the application requires a single cost", hint)
+    return ImportedTeam(folder, team, changed=found)
 
 
 def _xml_in(folder: Path) -> dict[str, bytes]:

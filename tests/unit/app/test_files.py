@@ -123,6 +123,11 @@ def test_a_file_more_or_less_is_a_change(folder: Path) -> None:
         open_team(folder)
 
 
+def test_a_team_with_several_objectives_is_refused() -> None:
+    with pytest.raises(InvalidInputError, match="several objectives, and the application requires a single cost"):
+        open_team(ROOT / "docs/examples/survey")
+
+
 @looped("name", ["patrol", "rescue", "hangar"])
 def test_a_team_of_others_is_opened_as_what_it_is(tmp_path: Path, name: str) -> None:
     path = ROOT / "docs/examples" / name
