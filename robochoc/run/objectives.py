@@ -13,7 +13,7 @@ from typing import NamedTuple
 from robochoc.formats import InvalidInputError, check_team
 from robochoc.model.change import team_after_events
 from robochoc.model.objectives import PARETO, Combination, ObjectivesMode
-from robochoc.model.outcome import FrontPoint, Outcome, Verdict
+from robochoc.model.outcome import EpochOutcome, FrontPoint, Outcome, Verdict
 from robochoc.model.problem import Team
 from robochoc.run.defaults import AUTO, CENTRAL, FRONT_PROTOCOL
 from robochoc.run.options import OnLoss, Options, Runtime
@@ -28,6 +28,7 @@ from robochoc.solver.objectives import (
 )
 from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.plain_text import listed
+from robochoc.verification.checker import objective_costs
 from robochoc.verification.front import MOST_ASSIGNMENTS, assignments_of, check_front, confirm_front, enumerated_front
 
 
@@ -77,8 +78,6 @@ class CombinedRun:
         Raises:
             RefutedError: if the checker refutes a point of the front.
         """
-        from robochoc.verification.checker import objective_costs  # noqa: PLC0415 - only answers need it
-
         if not outcome.assignment or outcome.lost:
             return outcome if self.mode.combination == Combination.WEIGHTED else replace(outcome, bound=None)
         if self.is_central_front and outcome.verdict == Verdict.OPTIMAL:
@@ -91,11 +90,19 @@ class CombinedRun:
         if self.mode.combination != Combination.WEIGHTED:  # combined costs are packed
             first = (self.mode.order or self.original.objectives)[0]
             stages = tuple([one._replace(cost=None) for one in outcome.stages])
-            found = replace(found, cost=costs[first], bound=None, stages=stages)
+            epochs = tuple([self._epoch(events, epoch, first) for events, epoch in enumerate(outcome.epochs)])
+            found = replace(found, cost=costs[first], bound=None, stages=stages, epochs=epochs)
         if front and self.options.verify and confirm_front(now, [one.objectives for one in front]):
             confirmed = tuple(dict.fromkeys([*outcome.confirmed_by, ENUMERATION]))
             found = replace(found, confirmed=True, confirmed_by=confirmed)
         return found
+
+    def _epoch(self, events: int, epoch: EpochOutcome, first: str) -> EpochOutcome:
+        """Return an epoch, after this number of events, with the costs in each objective."""
+        if not epoch.assignment:
+            return replace(epoch, bound=None)
+        costs = objective_costs(team_after_events(self.original, events), epoch.assignment, epoch.withdrawn)
+        return replace(epoch, cost=costs[first], objectives=costs, bound=None)
 
 
 ENUMERATION = "enumeration"

@@ -208,6 +208,20 @@ def test_a_model_returns_the_front() -> None:
     assert lexicographic.cost == lexicographic.objectives["risk"] == solution.front[-1].objectives["risk"]
 
 
+def test_epochs_have_the_costs_of_their_own_team() -> None:
+    model = trade_off()
+    event = model.after_solution()
+    event.add(model["drone0.height"] + model["drone2.height"] >= 7, cost=9, objective="energy")
+    with pytest.raises(UnsupportedError, match="a problem that changes"):
+        model.solve()
+    solution = model.solve("dpop", objectives="lexicographic:energy,risk")
+    assert [epoch.objectives for epoch in solution.epochs] == [
+        {"energy": 12, "risk": -42},
+        {"energy": 21, "risk": -42},
+    ]
+    assert [epoch.cost for epoch in solution.epochs] == [12, 21]
+
+
 @pytest.mark.parametrize("bases", ["0", "a", "1,2,3", "1,,2", str(2**63)])
 def test_invalid_bases_are_refused(bases: str) -> None:
     with pytest.raises(ValueError, match="positive integers"):
