@@ -41,6 +41,11 @@ def cost_shown(cost: Cost | float) -> str:
     return f"{cost:,f}" if isinstance(cost, Decimal) else f"{cost:,}"
 
 
+def in_unit(text: str, places: int) -> str:
+    """Return `text`, an expression of a cost in units of 10^-`places`, as an expression in the user's unit."""
+    return f"{Decimal(1).scaleb(-places):f} · ({text})" if places else text
+
+
 PLAIN_COSTS = CostUnits()
 """Integers that are minimised."""
 

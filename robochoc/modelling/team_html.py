@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from enum import Enum
 
 from robochoc.model.constraint import INFINITE, Constraint, Domain, Function, Predicate, Relation, Semantics
-from robochoc.model.cost_units import CostUnits, cost_shown
+from robochoc.model.cost_units import CostUnits, cost_shown, in_unit
 from robochoc.model.expression import Apply, Expression, Name
 from robochoc.model.expression import text as expression_text
 from robochoc.model.orders import constraint_graph
@@ -84,8 +84,7 @@ def _with_actual(expression: Expression, actual: Mapping[str, str | int]) -> Exp
 def _cost(constraint: Constraint, units: CostUnits) -> str:
     definition = constraint.definition
     if isinstance(definition, Function):
-        unit = CostUnits(places=definition.places).in_user_units(1)
-        return "its value" if unit == 1 else f"{unit} x its value"
+        return in_unit("its value", definition.places)
     if isinstance(definition, Relation) and definition.semantics == Semantics.SOFT:
         return "in the table"
     if constraint.cost == INFINITE:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from robochoc.model.constraint import INFINITE, Constraint, ConstraintModel, Function, Relation, Semantics
-from robochoc.model.cost_units import CostUnits, cost_shown
+from robochoc.model.cost_units import CostUnits, cost_shown, in_unit
 from robochoc.model.problem import Robot, Team
 from robochoc.modelling.infix import Infix
 from robochoc.modelling.team_html import domain_text
@@ -55,7 +55,7 @@ def _rule(team: Team, constraint: Constraint, robot: Robot) -> Iterator[str]:
         given = dict(zip(definition.parameters, constraint.parameters, strict=True))
         text = Infix(given, definition.symbolic, robot.symbol_table).text(definition.body)
         if isinstance(definition, Function):
-            yield f"{noun} {constraint.name}: {text}."
+            yield f"{noun} {constraint.name}: {in_unit(text, definition.places)}."
         elif constraint.cost == INFINITE:
             yield f"Rule {constraint.name}: {text}."
         else:

@@ -18,6 +18,7 @@ from robochoc.model.uncertainty import is_uncertain
 from robochoc.replay import replay
 from robochoc.run.options import OnLoss, Options, Runtime
 from robochoc.run.orchestrator import solve
+from robochoc.seats.words import problem_in_words
 from tests.support.examples import count, drawn
 from tests.support.program import ROOT
 from tests.support.replays import identical, recorded
@@ -122,3 +123,8 @@ def test_exported_to_frodo_and_imported_again_costs_the_same(tmp_path: Path) -> 
         assert first.cost == second.cost
         if is_uncertain(again) and first.uncertainty and second.uncertainty:
             assert first.uncertainty.scenarios == second.uncertainty.scenarios
+
+
+def test_a_seat_reads_costs_in_the_users_unit() -> None:
+    """The blur of a picture costs 3 for each level in wind, which has the probability 0.3."""
+    assert "\nCost sharp: 0.1 · (3 · (camera · 3)).\n" in problem_in_words(read_team(GUSTS), "Camera")

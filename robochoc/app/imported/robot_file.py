@@ -10,7 +10,7 @@ import msgspec
 from robochoc.app.texts import say
 from robochoc.formats.robot_reader import read_robot
 from robochoc.model.constraint import INFINITE, Constraint, ConstraintModel, Function, Predicate, Relation, Semantics
-from robochoc.model.cost_units import CostUnits, cost_shown
+from robochoc.model.cost_units import CostUnits, cost_shown, in_unit
 from robochoc.modelling.infix import Infix
 
 MOST_SENTENCES = 60
@@ -92,10 +92,7 @@ def _in_words(constraint: Constraint, symbols: Sequence[str], units: CostUnits) 
         case Function(parameters=formals, body=body, symbolic=symbolic):
             given = dict(zip(formals, constraint.parameters, strict=True))
             text = _Reading(given, symbolic, symbols).text(body)
-            if constraint.definition.places:
-                unit = cost_shown(CostUnits(places=constraint.definition.places).in_user_units(1))
-                text = say("imported.scaled", unit=unit, says=text)
-            return say("imported.costs", says=text)
+            return say("imported.costs", says=in_unit(text, constraint.definition.places))
 
 
 def _table(constraint: Constraint, relation: Relation, symbols: Sequence[str], units: CostUnits) -> str:
