@@ -49,7 +49,7 @@ def test_run_verify_submit_and_show(tmp_path: Path) -> None:
     added = robochoc_within("leaderboard", "submit", path, "--board", board, "--rerun", "2", "--jobs", "1")
     assert (added.returncode, added.stderr) == (0, checked.stdout)
     shown = robochoc_within("leaderboard", "show", board).stdout
-    assert re.search(r"^random: Random binary problems$", shown, re.MULTILINE)
+    assert re.search(r"^random, small: Random binary problems$", shown, re.MULTILINE)
     assert "Not for this family: dba." in shown
     robochoc_within("leaderboard", "show", board, "--html", site, "--markdown", tmp_path / "page.md")
     assert sorted(file.name for file in site.iterdir()) == [

@@ -275,7 +275,20 @@ def test_a_missing_peer_has_one_sentence(tmp_path: Path) -> None:
 def test_the_command_runs_peers_beside_protocols(tmp_path: Path) -> None:
     place = reporting(tmp_path, {**ANSWER, "cost": 1})
     path = tmp_path / "results.json"
-    words = ("dpop", "pydcop:dpop", "--peer", f"pydcop={place}", "--family", "random", "--seeds", "1", "--jobs", "1")
+    words = (
+        "dpop",
+        "pydcop:dpop",
+        "--peer",
+        f"pydcop={place}",
+        "--family",
+        "random",
+        "--size",
+        "small",
+        "--seeds",
+        "1",
+        "--jobs",
+        "1",
+    )
     done = robochoc_within("leaderboard", "run", *words, "-o", path)
     assert done.stderr == "pydcop:dpop on random-small-0 claims the cost 1, but its assignment costs 399\n"
     assert [run["protocol"] for run in json.loads(path.read_text())["runs"]] == ["dpop", "pydcop:dpop"]

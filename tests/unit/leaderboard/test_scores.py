@@ -31,7 +31,7 @@ def test_gaps() -> None:
     assert gap(answer(-1), best) == 1
     assert gap(answer(None, verdict="unknown"), best) == 1
     assert gap(answer(BEST, verdict="unknown"), best) == 0
-    zero = msgspec.structs.replace(best, cost=0)
+    zero = msgspec.structs.replace(best, cost=0, bound=0)
     assert gap(answer(0), zero) == 0
     assert gap(answer(7), zero) == 1
 
