@@ -117,8 +117,8 @@ def check_against_brute_force(team: Team, options: Options, solver: AceProcess |
     """
     protocol = protocol_named(options.protocol)
     if hasattr(protocol.settings, "cycles"):
-        options = replace(options, settings={"cycles": "20"})
-    if not protocol.traits.complete:
+        options = replace(options, settings={"cycles": "4" if protocol.traits.encrypted_tables else "20"})
+    if not protocol.traits.complete and not protocol.traits.encrypted_tables:
         options = replace(options, messages=ENOUGH)
     outcome = solve(team, options, solver=solver)
     truth = minimum_cost(team)
