@@ -67,7 +67,7 @@ def dsa(costs: Costs, robots: int, seed: int) -> list[int]:
     return best
 
 
-@count("number", fast=4, slow=400)
+@count("number", fast=4, slow=80)
 def test_the_answer_is_that_of_dsa_on_known_values(number: int) -> None:
     for seed in range(number):
         costs, team = random_costs(drawn(f"p-dsa {seed}"))

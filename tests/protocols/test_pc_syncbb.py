@@ -130,7 +130,7 @@ def small_teams(number: int) -> Iterator[tuple[int, Team]]:
         yield one, affordable("pc-syncbb", lambda: make(chance), 300)  # noqa: B023 - called at once
 
 
-@count("number", fast=12, slow=2000)
+@count("number", fast=12, slow=400)
 def test_both_searches_find_the_optimum_of_brute_force(number: int) -> None:
     for one, team in small_teams(number):
         least = minimum_cost(team)

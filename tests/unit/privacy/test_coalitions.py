@@ -21,6 +21,8 @@ from tests.support.examples import count, drawn
 from tests.support.private_problems import priced
 from tests.support.problems import team_of
 
+SLOW = pytest.mark.slow
+
 
 class HiddenSearch(PCSyncBB):
     """A hidden search in a small field, which is faster."""
@@ -103,15 +105,17 @@ def test_more_seeds_exclude_fewer_tables() -> None:
     assert few <= many
 
 
-@count("number", fast=1, slow=200)
-def test_a_hidden_search_discloses_nothing_to_minorities(number: int) -> None:
+@pytest.mark.parametrize(
+    "seeds", [range(1), *(pytest.param(range(at, at + 10), marks=SLOW) for at in range(0, 200, 10))]
+)
+def test_a_hidden_search_discloses_nothing_to_minorities(seeds: range) -> None:
     """No coalition of a minority can exclude a table, except by its own values in the answer."""
-    for seed in range(number):
+    for seed in seeds:
         report = measured(random_costs(drawn(f"coalitions {seed}")), HiddenSearch)
         assert [one.excluded_by_messages for one in report.losses] == [0] * len(report.losses)
 
 
-@count("number", fast=1, slow=50)
+@count("number", fast=1, slow=20)
 def test_a_private_local_search_discloses_nothing_to_minorities(number: int) -> None:
     for seed in range(number):
         report = measured(random_costs(drawn(f"local {seed}")), SmallField)
