@@ -6,7 +6,6 @@ docs/reference/format.md, "Real numbers".
 from __future__ import annotations
 
 import re
-from fractions import Fraction
 
 from lxml import etree
 
@@ -138,6 +137,8 @@ def read_steps(word: str, real: RealInterval) -> int:
 
 
 def _steps(word: str, places: int) -> int:
+    from fractions import Fraction  # noqa: PLC0415 - start-up: rarely needed
+
     exact = Fraction(word) * 10**places
     if exact.denominator != 1:
         hint = f'round it, or write precision="{scale_text(len(word.partition(".")[2]))}" in the presentation'

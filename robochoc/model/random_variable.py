@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import field
-from fractions import Fraction
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 from robochoc.system.lazy_dataclass import dataclass
+
+if TYPE_CHECKING:
+    from fractions import Fraction
 
 
 @dataclass(frozen=True)
@@ -32,5 +35,7 @@ class RandomVariable:
     @cached_property
     def probabilities(self) -> dict[int, Fraction]:
         """The probability of each outcome."""
+        from fractions import Fraction  # noqa: PLC0415 - start-up: rarely needed
+
         unit: int = 10**self.places
         return {value: Fraction(weight, unit) for value, weight in zip(self.outcomes, self.weights, strict=True)}

@@ -39,7 +39,6 @@ from robochoc.solver.errors import TooLargeError, UnsupportedError
 from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.time_limit import TimeLimitError, computed_by
 from robochoc.verification.checker import check_user_cost
-from robochoc.verification.policies import policy_report
 
 if TYPE_CHECKING:
     from robochoc.run.objectives import CombinedRun
@@ -130,6 +129,8 @@ class PreparedRun:
         context = RunContext(self.choice.options, observer, progress, solver, self.spent_s)
         outcome = without_proof(self.team, _solved(self.team, context, environment, audience))
         if self.uncertain and outcome.assignment and not outcome.epochs:
+            from robochoc.verification.policies import policy_report  # noqa: PLC0415 - start-up: rarely needed
+
             return replace(outcome, uncertainty=policy_report(self.uncertain, outcome, self.choice.options.risk))
         return outcome if self.combined is None else self.combined.outcome(outcome)
 

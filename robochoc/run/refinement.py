@@ -10,8 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from fractions import Fraction
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from msgspec import structs
 
@@ -23,6 +22,9 @@ from robochoc.model.real import RealInterval
 from robochoc.run.defaults import CENTRAL
 from robochoc.run.options import Options
 from robochoc.solver.agent_problem import StartValues
+
+if TYPE_CHECKING:
+    from fractions import Fraction
 
 MAX_GRIDS = 40
 """The maximum number of grids in a run."""
@@ -193,6 +195,8 @@ def _is_over(options: Options, best: Outcome) -> bool:
 
 def _better(team: Team, best: Outcome, new: Outcome) -> Outcome:
     """Return the better outcome, with the metrics of both."""
+    from fractions import Fraction  # noqa: PLC0415 - start-up: rarely needed
+
     sign = -1 if any(robot.costs.maximize for robot in team.robots) else 1
 
     def rank(outcome: Outcome) -> tuple[bool, int, Fraction]:
