@@ -169,24 +169,33 @@ def read_function(element: etree._Element, code: Callable[[str], int], places: i
 
 
 def read_topic(
-    element: etree._Element, variables: Collection[str], symbolic: Sequence[str], code: Callable[[str], int]
+    element: etree._Element,
+    variables: Collection[str],
+    symbolic: Sequence[str],
+    code: Callable[[str], int],
+    reals: tuple[Collection[str], int] = ((), 0),
 ) -> Topic:
     """Return a topic. Its `x`, `y`, `z` are integer expressions over the robot's own `variables`.
 
-    The `symbolic` variables can only be compared with symbols; `code` returns the code of a symbol. Raises
+    The `symbolic` variables can only be compared with symbols; `code` returns the code of a symbol. `reals` are the
+    real variables with their decimal places: coordinates over them are truncated to whole numbers. Raises
     `MistakeError`.
     """
     given: dict[str, Expression] = {}
+    sources: dict[str, Expression] = {}
     for axis in ("x", "y", "z"):
         body = element.get(axis)
         if body is not None:
             try:
                 symbols = SymbolNames(symbolic, _unparsed_if_unknown(code)) if symbolic else None
-                given[axis] = parse(body, variables, Type.INTEGER, symbols)
+                given[axis] = sources[axis] = parse(body, variables, Type.INTEGER, symbols, decimals=bool(reals[0]))
+                if reals[0]:
+                    given[axis] = fixed_point(sources[axis], *reals, Type.INTEGER, 0)
             except ExpressionError as error:
                 raise expression_mistake(f"{axis} of the topic", error) from None
     kind = attribute(element, "type") or Topic.type
-    return Topic(attribute(element, "name"), kind, given.get("x"), given.get("y"), given.get("z"))
+    found = tuple(map(sources.get, "xyz")) if reals[0] else ()
+    return Topic(attribute(element, "name"), kind, given.get("x"), given.get("y"), given.get("z"), found)
 
 
 def _unparsed_if_unknown(code: Callable[[str], int]) -> Callable[[str], int]:

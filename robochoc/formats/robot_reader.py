@@ -6,7 +6,7 @@ docs/reference/format.md, "One robot"; the paper, Figure 2.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar, cast
@@ -209,7 +209,7 @@ class _RobotReader:
         kind = ProblemKind(attribute(presentation, "type"))
         variables = self._variables(self._domains())
         kinds = {one.name: kind_of(one.domain) for one in variables}
-        topics = self._topics([name for name, one in kinds.items() if one == SYMBOL])
+        topics = self._topics(kinds)
         model = ConstraintModel(attribute(presentation, "constraintModel") or ConstraintModel.TKC)
         units = self._units(presentation, kind)
         objectives = self._objectives(presentation, kind, units)
@@ -307,11 +307,13 @@ class _RobotReader:
                 found[one.name] = one
         return tuple(found.values())
 
-    def _topics(self, symbolic: Sequence[str]) -> tuple[Topic, ...]:
+    def _topics(self, kinds: Mapping[str, str]) -> tuple[Topic, ...]:
+        symbolic = [name for name, kind in kinds.items() if kind == SYMBOL]
+        reals = [name for name, kind in kinds.items() if kind not in {INTEGER, SYMBOL}], self._places
         topics: dict[str, Topic] = {}
         for element in self._elements("topics", "topic", "nbTopics"):
             with self._report.at(line(element)):
-                topic = read_topic(element, self._own, symbolic, self._code_at(line(element)))
+                topic = read_topic(element, self._own, symbolic, self._code_at(line(element)), reals)
                 check_unique("topic", topic.name, topics)
                 topics[topic.name] = topic
         return tuple(topics.values())

@@ -123,7 +123,7 @@ def _write_topics(instance: etree._Element, robot: Robot) -> None:
         element = etree.SubElement(section, "topic", name=topic.name)
         if topic.type != Topic.type:
             element.set("type", topic.type)
-        for axis, expression in (("x", topic.x), ("y", topic.y), ("z", topic.z)):
+        for axis, expression in zip("xyz", topic.sources or (topic.x, topic.y, topic.z), strict=True):
             if expression is not None:
                 element.set(axis, text(expression, symbolic, robot.symbol_table))
 

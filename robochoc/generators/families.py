@@ -24,6 +24,7 @@ from robochoc.generators import sensors as sensor_networks
 from robochoc.generators import smart_grid as grids
 from robochoc.generators import smart_homes as lightings
 from robochoc.generators import stochastic as stochastic_problems
+from robochoc.generators import swarm as swarms
 from robochoc.generators import tasks as allocations
 from robochoc.generators import tracking as trackings
 from robochoc.generators.graph_choice import GraphChoice
@@ -244,6 +245,7 @@ FAMILIES: Mapping[str, Callable[..., Team]] = MappingProxyType(
         "sensors": sensor_networks.sensors,
         "smart-grid": grids.smart_grid,
         "smart-homes": lightings.smart_homes,
+        "swarm": swarms.swarm,
         "tasks": tasks,
         "tracking": trackings.tracking,
     }

@@ -92,7 +92,8 @@ class ProblemKind(StrEnum):
 class Topic:
     """A topic on which a robot's decision is published (ROS Layer unit).
 
-    `x`, `y`, `z` are the waypoint's position.
+    `x`, `y`, `z` are the waypoint's position, in whole numbers. `sources` are the expressions over real variables from
+    which they were made, if the robot has such variables.
     """
 
     name: str
@@ -100,6 +101,7 @@ class Topic:
     x: Expression | None = None
     y: Expression | None = None
     z: Expression | None = None
+    sources: tuple[Expression | None, ...] = field(default=(), compare=False)
 
 
 @dataclass(frozen=True)

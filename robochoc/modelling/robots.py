@@ -181,8 +181,7 @@ class ModelRobot:
         Raises:
             ModelError: if a term contains other robots' variables, or files cannot express it.
         """
-        axes = {axis: self._axis(value) for axis, value in (("x", x), ("y", y), ("z", z))}
-        self.add_topics(Topic(name, type, **axes))
+        self.add_topics(Topic(name, type, self._axis(x), self._axis(y), self._axis(z)))
 
     def _axis(self, value: object) -> Expression | None:
         if value is None:

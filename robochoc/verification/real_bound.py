@@ -11,18 +11,23 @@ import heapq
 import itertools
 import math
 from collections.abc import Collection, Mapping, Sequence
+from fractions import Fraction
 from typing import NamedTuple
 
 from robochoc.model.constraint import INFINITE, Constraint, Function, Predicate, Relation
 from robochoc.model.cost_units import Cost, common_units
 from robochoc.model.expression import Apply, Constant, Expression, UndefinedValueError, evaluate, names
 from robochoc.model.expression.bounds import Interval, bounds
-from robochoc.model.expression.slopes import local_model
+from robochoc.model.expression.slopes import Number, local_model
 from robochoc.model.magnitudes import extent
 from robochoc.model.problem import Assignment, Team
 
 EVALUATIONS = 40_000
 """The default maximum number of evaluations of a cost over a box."""
+
+_TANGENTS = 60
+"""The number of tangents of convex costs."""
+_FINENESS = 1024
 
 _Box = dict[str, Interval]
 
@@ -104,6 +109,7 @@ def _bound(problem: _Problem, best: Assignment, evaluations: int) -> int | None:
     first = _opened(problem, problem.box, best, next(count))
     if first is None:
         return None
+    first = first._replace(bound=max(first.bound, _convex_bound(problem, best)))
     waiting, closed = [first], [] if known is None else [known]
     while waiting and evaluations > 0 and (known is None or waiting[0].bound < known):
         one = heapq.heappop(waiting)
@@ -141,18 +147,72 @@ def _opened(problem: _Problem, box: _Box, best: Assignment, number: int) -> _Ope
             tangents, means = tangents + low, means + low
             steep.update(names(cost.body))
             continue
-        at = cost.weight * model.value - cost.slack
+        at = int(cost.weight * model.value) - cost.slack
         means += at
         _add(slopes, model.slopes, cost.weight)
         if model.convex if cost.weight > 0 else model.concave:
             tangents += at
-            _add(gradient, {name: Interval(one, one) for name, one in model.gradient.items()}, cost.weight)
+            _add(gradient, {name: Interval(int(one), int(one)) for name, one in model.gradient.items()}, cost.weight)
         else:
             tangents += low
     means += sum(_descent(slope, box[name], point[name]) for name, slope in slopes.items())
     tangents += sum(_descent(slope, box[name], point[name]) for name, slope in gradient.items())
     left = {name: part if name in steep else _better_end(part, slopes.get(name)) for name, part in box.items()}
-    return _Open(int(max(intervals, means, tangents)), number, left, slopes)
+    return _Open(math.floor(max(intervals, means, tangents)), number, left, slopes)
+
+
+def _convex_bound(problem: _Problem, best: Assignment) -> int:
+    """Return the best bound by tangents at points on the way to the minimum, if all costs are convex.
+
+    The way follows gradients with the steps of Barzilai and Borwein (IMA Journal of Numerical Analysis 8, 1988). The
+    tangents are exact, so that each of them is a bound wherever the way leads.
+    """
+    point: dict[str, Number] = {name: _nearest(best.get(name), part) for name, part in problem.box.items()}
+    bounds_found = [_lowest(problem)]
+    before: tuple[dict[str, Number], dict[str, Number]] | None = None
+    for _ in range(_TANGENTS):
+        bound, gradient = Fraction(problem.least), dict[str, Number]()
+        for cost in problem.costs:
+            model = local_model(cost.body, problem.box, point)
+            if model is None or not (model.convex if cost.weight > 0 else model.concave):
+                return bounds_found[0]
+            bound += cost.weight * model.value - cost.slack
+            for name, slope in model.gradient.items():
+                gradient[name] = gradient.get(name, 0) + cost.weight * slope
+        for name, slope in gradient.items():
+            low, high = problem.box[name]
+            bound += min(slope * (int(high) - point[name]), slope * (int(low) - point[name]))
+        bounds_found.append(math.floor(bound))
+        point, before = _next_point(problem.box, point, gradient, before), (point, gradient)
+    return max(bounds_found)
+
+
+def _lowest(problem: _Problem) -> int:
+    lows = [_product(bounds(cost.body, problem.box), cost.weight).low - cost.slack for cost in problem.costs]
+    return int(sum(lows)) + problem.least
+
+
+def _next_point(
+    box: _Box,
+    point: dict[str, Number],
+    gradient: dict[str, Number],
+    before: tuple[dict[str, Number], dict[str, Number]] | None,
+) -> dict[str, Number]:
+    """Return the point after a step against the gradient, in fractions of 1/`_FINENESS`."""
+    widest = max((part.high - part.low for part in box.values()), default=0)
+    steepest = max((abs(float(slope)) for slope in gradient.values()), default=0.0) or 1.0
+    length = widest / 8 / steepest
+    if before is not None:
+        moved = {name: float(point[name] - before[0][name]) for name in point}
+        changed = {name: float(gradient.get(name, 0) - before[1].get(name, 0)) for name in point}
+        curvature = sum(moved[name] * changed[name] for name in point)
+        if curvature > 0:
+            length = sum(one * one for one in moved.values()) / curvature
+    found: dict[str, Number] = {}
+    for name, (low, high) in box.items():
+        target = min(max(float(point[name]) - length * float(gradient.get(name, 0)), low), high)
+        found[name] = Fraction(round(target * _FINENESS), _FINENESS)
+    return found
 
 
 def _nearest(value: int | None, part: Interval) -> int:

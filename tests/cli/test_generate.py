@@ -27,6 +27,7 @@ from robochoc.generators.random_csp import random_on
 from robochoc.generators.sensors import Reach, grid_sensors, sensors
 from robochoc.generators.smart_homes import smart_homes
 from robochoc.generators.stochastic import stochastic
+from robochoc.generators.swarm import swarm
 from robochoc.generators.tasks import Skills, Travel, tasks
 from robochoc.generators.tracking import tracking
 from robochoc.maps.occupancy.grid import read_occupancy_grid
@@ -60,6 +61,7 @@ FAMILIES: dict[str, Callable[[], Team]] = {
         agents=5, domain=2, constraints=4, max_cost=9
     ),
     "stochastic --agents 5 --domain 3 --observed 0.5": lambda: stochastic(agents=5, domain=3, observed=0.5),
+    "swarm --agents 3 --side 6 --points 5 --seed 2": lambda: swarm(agents=3, side=6, points=5, seed=2),
     "frequencies --agents 5 --frequencies 3": lambda: frequencies(agents=5, frequencies=3),
     "heights --agents 4 --levels 3": lambda: heights(agents=4, levels=3),
     "smart-homes --agents 4 --rules 3 --levels 3": lambda: smart_homes(agents=4, rules=3, levels=3),

@@ -8,6 +8,7 @@ convex programming (Grant, Boyd and Ye, 2006).
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from fractions import Fraction
 from functools import reduce
 from typing import NamedTuple
 
@@ -16,7 +17,8 @@ from robochoc.model.expression.operators import OPERATORS
 from robochoc.model.expression.tree import Apply, Constant, Expression, Name, Type
 
 Box = Mapping[str, Interval]
-Point = Mapping[str, int]
+Number = Fraction | int
+Point = Mapping[str, Number]
 Slopes = dict[str, Interval]
 
 
@@ -33,9 +35,9 @@ class LocalModel(NamedTuple):
     """
 
     range: Interval
-    value: int
+    value: Number
     slopes: Slopes
-    gradient: dict[str, int]
+    gradient: dict[str, Number]
     convex: bool
     concave: bool
 
@@ -79,7 +81,7 @@ def _combined(factor: int, part: LocalModel) -> LocalModel:
 
 def _sum(*parts: LocalModel) -> LocalModel:
     slopes: Slopes = {}
-    gradient: dict[str, int] = {}
+    gradient: dict[str, Number] = {}
     for part in parts:
         for name, slope in part.slopes.items():
             before = slopes.get(name, Interval(0, 0))
@@ -126,7 +128,7 @@ def _scaled(one: Interval, other: Interval) -> Interval:
     return Interval(min(ends), max(ends))
 
 
-def _composed(part: LocalModel, value: int, highest: float, slope: Interval, at: int) -> LocalModel:
+def _composed(part: LocalModel, value: Number, highest: float, slope: Interval, at: Number) -> LocalModel:
     """Return a convex function with the minimum 0 at 0, whose slope over the box is `slope`, and `at` at the point."""
     is_rising = part.convex and part.range.low >= 0
     is_falling = part.concave and part.range.high <= 0
@@ -142,7 +144,9 @@ def _composed(part: LocalModel, value: int, highest: float, slope: Interval, at:
 
 def _square(part: LocalModel) -> LocalModel:
     low, high = part.range
-    found = _composed(part, part.value**2, max(low * low, high * high), Interval(2 * low, 2 * high), 2 * part.value)
+    found = _composed(
+        part, part.value * part.value, max(low * low, high * high), Interval(2 * low, 2 * high), 2 * part.value
+    )
     return found if low <= 0 <= high else found._replace(range=Interval(min(low * low, high * high), found.range.high))
 
 
@@ -152,7 +156,8 @@ def _absolute(part: LocalModel) -> LocalModel:
     if part.range.high <= 0:
         return _combined(-1, part)
     at = (part.value > 0) - (part.value < 0)
-    return _composed(part, abs(part.value), max(-part.range.low, part.range.high), Interval(-1, 1), at)
+    size = max(part.value, -part.value)
+    return _composed(part, size, max(-part.range.low, part.range.high), Interval(-1, 1), at)
 
 
 def _distance(left: LocalModel, right: LocalModel) -> LocalModel:

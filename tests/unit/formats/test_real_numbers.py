@@ -94,6 +94,17 @@ def test_results_contain_numbers_and_are_read_back(tmp_path: Path) -> None:
     assert outcome.labelled(outcome.assignment)["x"] == 2.5
 
 
+def test_coordinates_are_whole_numbers(tmp_path: Path) -> None:
+    topic = '<topics><topic name="/a" x="mul(x, 100)" y="x"/></topics><functions>'
+    team = _team(tmp_path / "t", A.replace("<functions>", topic, 1))
+    x, y = team["A"].topics[0].x, team["A"].topics[0].y
+    assert x is not None
+    assert y is not None
+    assert (evaluate(x, {"x": 2345}), evaluate(y, {"x": 2345})) == (234, 2)
+    write_team(team, tmp_path / "copy" / "t")
+    assert read_team(tmp_path / "copy" / "t") == team
+
+
 def test_a_scenario_removes_points(tmp_path: Path) -> None:
     folder = tmp_path / "t"
     _team(folder)

@@ -7,7 +7,15 @@ import click
 from robochoc.cli.commands.generate.binary import agentsnet, coloring, ising, random_problem
 from robochoc.cli.commands.generate.maps import coverage, formation, patrol
 from robochoc.cli.commands.generate.missions import grid_sensors, meetings, sensors, tasks, tracking
-from robochoc.cli.commands.generate.networks import frequencies, heights, nary, smart_grid, smart_homes, stochastic
+from robochoc.cli.commands.generate.networks import (
+    frequencies,
+    heights,
+    nary,
+    smart_grid,
+    smart_homes,
+    stochastic,
+    swarm,
+)
 from robochoc.cli.commands.generate.queens import queens3d
 from robochoc.cli.commands.generate.scenario import scenario
 
@@ -42,6 +50,7 @@ for family in (
     smart_grid,
     smart_homes,
     stochastic,
+    swarm,
     tasks,
     tracking,
 ):

@@ -1,4 +1,4 @@
-"""`robochoc generate nary`, `stochastic`, `frequencies`, `heights`, ...: links, lamps, and chance."""
+"""`robochoc generate nary`, `stochastic`, `frequencies`, `heights`, `swarm`, ...: links, lamps, drones, and chance."""
 
 from __future__ import annotations
 
@@ -43,6 +43,26 @@ def nary(**problem: Any) -> Team:  # noqa: ANN401 - `nary`'s own
     from robochoc.generators.nary import nary as random_nary
 
     return random_nary(**problem)
+
+
+@click.command(short_help="A swarm: drones choose real positions.")
+@number_option("--agents", "Number of drones.")
+@number_option("--side", "Side of the square, in metres.", least=2, most=1000, default=10)
+@number_option("--points", "Points of the first grid, for x and y.", least=2, most=1000, default=9)
+@seed_option
+@writes_team("swarm-AGENTS-SIDE[-POINTS]-SEED")
+def swarm(**problem: Any) -> Team:  # noqa: ANN401 - `swarm`'s own
+    """Drones choose real positions near their homes, and in a formation with their neighbours.
+
+    Costs are squares of distances. Robot3 has the variables x3 and y3, in metres with a precision of 0.01.
+
+    \b
+    robochoc generate swarm --agents 6
+    robochoc generate swarm --agents 20 --side 50 --seed 2
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
+    from robochoc.generators.swarm import swarm as drones
+
+    return drones(**problem)
 
 
 @click.command(short_help="Random variables: costs that depend on chance.")
