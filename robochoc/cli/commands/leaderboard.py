@@ -360,12 +360,14 @@ class _Common(TypedDict):
 
 def _peers(words: Sequence[str], places: Sequence[str]) -> list[PeerEntrant]:
     """Return the peers' algorithms named by words, with the programs given as NAME=PATH."""
+    import shutil
+
     given: dict[str, Path] = {}
     for place in places:
         name, equals, path = place.partition("=")
         if not equals or not path or name in given:
             raise click.UsageError(f"--peer: {place!r} is not of the form NAME=PATH, with each name once.")
-        given[name] = Path(path).expanduser()
+        given[name] = Path(shutil.which(path) or path).expanduser().absolute()
     if not words and not given:
         return []
     from robochoc.leaderboard.peers.running import peer_entrants

@@ -135,6 +135,11 @@ def exported(team: Team, dialect_name: str) -> bytes:
     return next(iter(dialect.write(team, ExportOptions()).files.values()))
 
 
+def violates(cost: float, forbidden: float) -> bool:
+    """Return whether a cost is that of a forbidden tuple, which is ten times any sum of finite costs, and others."""
+    return abs(cost) > forbidden / 2
+
+
 def last_line(ended: EndedProgram) -> str:
     """Return the last line that a program wrote about an error, in a form safe for display."""
     lines = (ended.errors.strip() or ended.output.strip()).splitlines()

@@ -16,7 +16,7 @@ from typing import ClassVar
 import msgspec
 
 from robochoc.formats.dialects.tabulation import constant_table, forbidden_cost, is_maximised, tabulate
-from robochoc.leaderboard.peers.peer import CYCLES, SCRIPTS, Algorithm, Peer, PeerAnswer, PeerError, last_line
+from robochoc.leaderboard.peers.peer import CYCLES, SCRIPTS, Algorithm, Peer, PeerAnswer, PeerError, last_line, violates
 from robochoc.leaderboard.peers.program import EndedProgram
 from robochoc.model.constraint import INFINITE
 from robochoc.model.problem import Team
@@ -95,5 +95,5 @@ class Propflow(Peer):
             values = {name: problem.domains[name][place] for name, place in found.assignment.items()}
         except (msgspec.MsgspecError, LookupError, RecursionError) as wrong:
             raise PeerError(f"its result cannot be read: {on_one_line(str(wrong), 200)}") from None
-        cost = math.inf if found.cost >= problem.forbidden else -found.cost if problem.maximises else found.cost
+        cost = math.inf if violates(found.cost, problem.forbidden) else -found.cost if problem.maximises else found.cost
         return PeerAnswer(values, cost, is_finished=True)

@@ -23,6 +23,7 @@ from robochoc.leaderboard.peers.peer import (
     PeerError,
     exported,
     last_line,
+    violates,
 )
 from robochoc.leaderboard.peers.program import EndedProgram
 from robochoc.model.problem import Team
@@ -100,6 +101,6 @@ class Pydcop(Peer):
         values = {name: value for name, value in found.assignment.items() if isinstance(value, int)}
         cost = found.cost
         forbidden = _INFINITY.search((folder / _PROBLEM).read_bytes())
-        if cost is not None and forbidden and abs(cost) >= int(forbidden[1]):
+        if cost is not None and forbidden and violates(cost, int(forbidden[1])):
             cost = math.inf
         return PeerAnswer(values, cost, found.status == _FINISHED, found.msg_count)

@@ -113,6 +113,9 @@ def test_hard_constraints_are_checked(tmp_path: Path) -> None:
     place = reporting(tmp_path, {**ANSWER, "assignment": equal, "cost": 10_000})
     hard = result(place, instance="coloring-hard-small-0")
     assert (hard.verdict, hard.status, hard.claimed_verdict) == ("no-solution", Status.DONE, "no-solution")
+    place = reporting(tmp_path, {**ANSWER, "assignment": {}, "cost": -9_991})  # it is 9 without the violation
+    assert result(place, "pydcop:dsa", instance="meetings-small-0").claimed_verdict is None
+    place = reporting(tmp_path, {**ANSWER, "assignment": equal, "cost": 10_000})
     local = result(place, "pydcop:dsa", instance="coloring-hard-small-0")
     assert (local.verdict, local.claimed_verdict) == ("unknown", None)
     assert local.reason == "its assignment violates 42 of 42 hard constraints"
@@ -253,7 +256,20 @@ def test_a_missing_peer_has_one_sentence(tmp_path: Path) -> None:
     assert {*PEERS} == {*PEER_NAMES}
     file = tmp_path / "file"
     file.write_text("text")
-    run = ("leaderboard", "run", "--family", "random", "--seeds", "1", "--jobs", "1", "-o", tmp_path / "results.json")
+    run = (
+        "leaderboard",
+        "run",
+        "--family",
+        "random",
+        "--size",
+        "small",
+        "--seeds",
+        "1",
+        "--jobs",
+        "1",
+        "-o",
+        tmp_path / "results.json",
+    )
     wrong: list[tuple[tuple[str, ...], str]] = [
         (("pydcop:dpop",), "pydcop:dpop requires --peer pydcop=PYTHON; install pyDCOP"),
         (("pydcop:dpopp", "--peer", f"pydcop={file}"), "pyDCOP has no algorithm 'dpopp'; did you mean 'dpop'?"),
@@ -272,14 +288,15 @@ def test_a_missing_peer_has_one_sentence(tmp_path: Path) -> None:
                 assert len(done.stderr.strip().splitlines()) <= 4
 
 
-def test_the_command_runs_peers_beside_protocols(tmp_path: Path) -> None:
-    place = reporting(tmp_path, {**ANSWER, "cost": 1})
+def test_the_command_runs_peers_beside_protocols(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    reporting(tmp_path, {**ANSWER, "cost": 1})
+    monkeypatch.chdir(tmp_path)
     path = tmp_path / "results.json"
     words = (
         "dpop",
         "pydcop:dpop",
         "--peer",
-        f"pydcop={place}",
+        "pydcop=./python",
         "--family",
         "random",
         "--size",
