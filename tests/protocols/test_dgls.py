@@ -65,7 +65,7 @@ def test_a_function_is_violated_with_the_share_of_its_cost_between_minimum_and_m
             assert bool(it.penalised) is violated
 
 
-def testpenalties_are_told_with_the_next_value_and_only_in_a_quasi_local_minimum() -> None:
+def test_penalties_are_sent_with_the_next_value_and_only_in_a_quasi_local_minimum() -> None:
     it = robot(of(2, 5, 3, 1))
     cycle(it, 1, told=Reduction(0, 1))
     assert it.penalised == []

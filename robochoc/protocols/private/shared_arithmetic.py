@@ -84,7 +84,7 @@ class Opened(SharesMessage, frozen=True):
         return f"the masked values are {self.shares[:4].hex()}... ({len(self.shares):,} bytes)"
 
 
-class Result(SharesMessage, frozen=True):
+class PublicResult(SharesMessage, frozen=True):
     """Results of the computation that all robots may know."""
 
     masked = frozenset()
@@ -103,7 +103,7 @@ class Output(SharesMessage, frozen=True):
         return "my share of your result"
 
 
-SharedArithmeticMessage = Randomness | Inputs | Masked | Opened | Result | Output
+SharedArithmeticMessage = Randomness | Inputs | Masked | Opened | PublicResult | Output
 
 
 class Awaited(NamedTuple):
@@ -159,7 +159,7 @@ class SharedArithmeticProtocol(Protocol):
         self._numbers: list[int] = []
         self._comparison: Comparison | None = None
         self._published: list[int] = []
-        self._kind: type[SharesMessage] = Result
+        self._kind: type[SharesMessage] = PublicResult
         self._then: dict[str, str] = {}
         """The methods that continue after a step, by the name of the step."""
 
@@ -216,7 +216,7 @@ class SharedArithmeticProtocol(Protocol):
 
     def open(self, shares: Sequence[int], then: str) -> None:
         """Open shared results to all robots. Continue with `then`."""
-        self._open(Result, shares, then)
+        self._open(PublicResult, shares, then)
 
     def _open(self, kind: type[SharesMessage], shares: Sequence[int], then: str) -> None:
         """Send the shares to the first robot, which combines them and sends the values to all in a message `kind`."""
