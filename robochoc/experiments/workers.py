@@ -60,7 +60,7 @@ class LocalWorkers:
 
     def rows(self, bundles: Iterable[Sequence[Task]]) -> Iterator[tuple[Task, Row]]:
         """Yield the row of each task as soon as the task is finished."""
-        waiting = deque(deque(bundle) for bundle in bundles)
+        waiting = deque(deque(bundle) for bundle in bundles if bundle)
         while waiting or any(worker.tasks for worker in self._workers):
             self._hand_out(waiting)
             for key, _ in self._selector.select(self._patience_s()):

@@ -63,7 +63,7 @@ def run_leaderboard(
         times: True if processor times are recorded, which differ from run to run.
         progress: Called with the number of finished runs and of all runs.
     """
-    by_instance = [[_task(one, protocol, budget, seed) for protocol in protocols] for one in instances if protocols]
+    by_instance = [[_task(one, protocol, budget, seed) for protocol in protocols] for one in instances]
     tasks = [task for bundle in by_instance for task in bundle]
     places = {task.key: place for place, task in enumerate(tasks)}
     where = [(one, protocol) for one in instances for protocol in protocols]

@@ -143,6 +143,11 @@ def test_a_worker_that_is_killed_costs_the_run_that_it_was_at() -> None:
     assert crashed.reason == "the process was ended by SIGKILL; perhaps there was not enough memory"
 
 
+def test_workers_skip_empty_bundles() -> None:
+    with LocalWorkers(1) as workers:
+        assert list(workers.rows([[], []])) == []
+
+
 def _keyed(task: Task, row: Row) -> tuple[str, Row]:
     return task.key, row
 
