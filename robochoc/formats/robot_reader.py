@@ -300,11 +300,14 @@ class _RobotReader:
 
     def _random_variables(self) -> tuple[RandomVariable, ...]:
         found: dict[str, RandomVariable] = {}
-        for element in self._elements("random_variables", "random", "nbRandom"):
+        elements = list(self._elements("random_variables", "random", "nbRandom"))
+        for element in elements:
             with self._report.at(line(element)):
                 one = read_random(element)
                 check_random(one, self._own, found)
                 found[one.name] = one
+        if len(found) < len(elements):
+            self._report.finish()  # further errors may be consequences of this one
         return tuple(found.values())
 
     def _topics(self, kinds: Mapping[str, str]) -> tuple[Topic, ...]:

@@ -29,6 +29,7 @@ MAX_OUTCOMES = 4096
 """The maximum number of joint outcomes on which a constraint or a variable depends."""
 MAX_PARTS = 2_000_000
 """The maximum number of variables, constraints and costs in a robot's deterministic equivalent."""
+_MOST_NAMES = 10
 
 Scenario = Mapping[str, int]
 """Outcomes of random variables, by name."""
@@ -293,11 +294,17 @@ def _check_number(randoms: Sequence[RandomVariable], what: str, line: int = 0) -
     number = math.prod(len(one.outcomes) for one in randoms)
     if number > MAX_OUTCOMES:
         raise UncertaintyError(
-            f"{what} depends on {counted(number, 'joint outcome')} of {' '.join(one.name for one in randoms)}",
+            f"{what} depends on {counted(number, 'joint outcome')} of {named(randoms)}",
             f"use at most {MAX_OUTCOMES:,}: fewer outcomes, or fewer random variables in one constraint",
             line,
         )
     return number
+
+
+def named(randoms: Sequence[RandomVariable]) -> str:
+    """Return the names of `randoms` for a message, at most ten of them."""
+    names = " ".join(one.name for one in randoms[:_MOST_NAMES])
+    return f"{names} and {len(randoms) - _MOST_NAMES:,} more" if len(randoms) > _MOST_NAMES else names
 
 
 def _word(outcome: int) -> str:

@@ -26,7 +26,8 @@ from robochoc.model.constraint import (
 from robochoc.model.cost_units import CostUnits, common_units
 from robochoc.model.problem import Robot, Team
 from robochoc.model.random_variable import RandomVariable
-from robochoc.model.uncertainty import Outcomes, UncertaintyError, declared_robots, random_variables
+from robochoc.model.uncertainty import Outcomes, UncertaintyError, declared_robots, named, random_variables
+from robochoc.system.plain_text import counted
 
 MAX_ROWS = 200_000
 """The maximum number of rows in a table of worst costs."""
@@ -124,8 +125,8 @@ class _Tables:
         rows = math.prod(len(self._domains[name]) for name in names)
         if rows > MAX_ROWS or rows * number * len(group) > MAX_EVALUATIONS:
             raise UncertaintyError(
-                f"the worst case of the costs that depend on {' '.join(one.name for one in randoms)} has {rows:,}"
-                f" combinations of {len(names)} variables, in {number:,} scenarios",
+                f"the worst case of the costs that depend on {named(randoms)} has {rows:,}"
+                f" combinations of {counted(len(names), 'variable')}, in {number:,} scenarios",
                 f"use --risk expected, or at most {MAX_ROWS:,} combinations and {MAX_EVALUATIONS:,} computed costs",
             )
         cases = [

@@ -46,7 +46,7 @@ def outcome_report(team: Team, outcome: Outcome, ground: GroundMap | None = None
     places = MapPlaces(team, ground)
     if outcome.assignment:
         lines += _values(team, outcome.labelled(outcome.assignment), places.places_of(outcome.assignment))
-    lines += [*_front(outcome), *_listed(team, outcome, places), *_uncertainty(outcome)]
+    lines += [*_front(outcome), *_listed(team, outcome, places), *_uncertainty(team, outcome)]
     if outcome.withdrawn_alive:
         lines += [
             f"  {len(outcome.withdrawn_alive)} withdrawn{_weight(team, outcome)}:",
@@ -61,10 +61,10 @@ def outcome_report(team: Team, outcome: Outcome, ground: GroundMap | None = None
     return "\n".join(map(on_one_line, lines))
 
 
-def _uncertainty(outcome: Outcome) -> list[str]:
+def _uncertainty(team: Team, outcome: Outcome) -> list[str]:
     """Return a line with the expected and the worst cost, if the problem has random variables and costs."""
     report = outcome.uncertainty
-    if report is None or report.expected is None:
+    if report is None or report.expected is None or team.kind == ProblemKind.DISCSP:
         return []
     scenarios = counted(report.scenarios, "scenario")
     worst = f"unknown: there are {scenarios}"

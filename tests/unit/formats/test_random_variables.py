@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
 import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+import robochoc
+from robochoc.cli.reports.outcome import outcome_report
 from robochoc.formats import check_team
 from robochoc.formats.diagnostics import InvalidInputError
 from robochoc.formats.result import read_result, result_json
@@ -61,7 +64,9 @@ MISTAKES = [
 @looped(("written", "message"), MISTAKES)
 def test_mistakes_have_their_line(written: str, message: str, tmp_path: Path) -> None:
     folder = tmp_path / str(abs(hash(written)))
-    assert mistakes_in(folder, "Relay.xml", ('seen_by="relay">0.7:0|0.3:3<', written))[0] == message
+    found = mistakes_in(folder, "Relay.xml", ('seen_by="relay">0.7:0|0.3:3<', written))
+    assert found[0] == message
+    assert not any("private constraint" in one for one in found), "a consequence of the mistake"
 
 
 def test_mistakes_between_files(tmp_path: Path) -> None:
@@ -136,6 +141,25 @@ def test_a_robot_with_random_variables_must_be_converted() -> None:
 def test_the_worst_case_is_limited_and_needs_random_variables() -> None:
     with pytest.raises(UnsupportedError, match="scouts has no random variables"):
         solve(read_team(ROOT / "docs" / "examples" / "scouts"), replace(SIMULATED, risk=Risk.WORST))
+
+
+def test_a_report_names_costs_only_if_there_are_any() -> None:
+    model = robochoc.Model("calm")
+    place = model.robot("one").variable("place", range(3))
+    model.add(place + model.random("wind", {0: 0.5, 1: 0.5}) < 3)
+    assert "expected cost" not in outcome_report(model.team, solve(model.team, SIMULATED))
+    model.minimize(3 - place)
+    assert "expected cost 2; worst case 2 (the same)" in outcome_report(model.team, solve(model.team, SIMULATED))
+
+
+def test_a_message_about_many_random_variables_is_short() -> None:
+    model = robochoc.Model("coins")
+    place = model.robot("one").variable("place", range(2))
+    coins = [model.random(f"coin{number}", {0: 0.5, 1: 0.5}) for number in range(40)]
+    for one, other in itertools.pairwise(coins):
+        model.add(one + other != place, cost=1)
+    with pytest.raises(UnsupportedError, match=r"coin8 coin9 and 30 more has 2 combinations of 1 variable, in 1,099,"):
+        solve(model.team, replace(SIMULATED, risk=Risk.WORST))
 
 
 def test_too_many_outcomes_are_refused(tmp_path: Path) -> None:
