@@ -49,7 +49,7 @@ def counted_solutions(count: int, outcome: Outcome) -> str:
     """Return the number of solutions or optima as text. The number may be arbitrarily large."""
     if outcome.verdict == Verdict.SOLUTION:
         return f"{Decimal(count):,} solution{'s' * (count != 1)}"
-    return f"{Decimal(count):,} optim{'um' if count == 1 else 'a'} of cost {cost_shown(outcome.cost or 0)}"
+    return f"{Decimal(count):,} optim{'um' if count == 1 else 'a'} of {_cost(outcome).removeprefix(', ')}"
 
 
 def _solution(outcome: Outcome) -> str:

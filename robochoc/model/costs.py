@@ -55,8 +55,8 @@ def refuse_several_objectives(one: Team | Robot) -> None:
         names = ", ".join(one.objectives)
         weights = ",".join(f"{name}=1" for name in one.objectives)
         raise SeveralObjectivesError(
-            f"there are several objectives ({names}), and this requires a single cost: solve the team with --objectives"
-            f" weighted:{weights}, or export its problem with a single cost and import it"
+            f"there are several objectives ({names}), and this requires a single cost: robochoc solve and robochoc"
+            f" export combine them (--objectives weighted:{weights}), and robochoc import reads the exported problem"
         )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from robochoc.model.costs import NormalizationError, normalized
+from robochoc.model.objectives import PARETO
 from robochoc.model.problem import Team
 from robochoc.protocols.traits import Traits
 from robochoc.run.choice_rules import RULES
@@ -37,6 +38,8 @@ def alternatives(
         costs: True if the protocol must minimise costs.
         narrow: True if its tables must be narrower than DPOP's, because DPOP's tables would need too much memory.
     """
+    if options.objectives == PARETO:
+        return "; or combine the objectives into a single cost: --objectives weighted:... or lexicographic:..."
     names = [
         offer.name
         for offer in installed_protocols()

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import NamedTuple
+from itertools import accumulate
+from typing import NamedTuple, TypeVar
 
 from robochoc.formats import InvalidInputError, check_team
 from robochoc.model.change import team_after_events
@@ -28,8 +29,10 @@ from robochoc.solver.objectives import (
 )
 from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.plain_text import listed
-from robochoc.verification.checker import objective_costs
+from robochoc.verification.checker import objective_costs, robots_without_values
 from robochoc.verification.front import MOST_ASSIGNMENTS, assignments_of, check_front, confirm_front, enumerated_front
+
+_Answer = TypeVar("_Answer", EpochOutcome, Outcome)
 
 
 class FrontRule(NamedTuple):
@@ -78,31 +81,38 @@ class CombinedRun:
         Raises:
             RefutedError: if the checker refutes a point of the front.
         """
-        if not outcome.assignment or outcome.lost:
-            return outcome if self.mode.combination == Combination.WEIGHTED else replace(outcome, bound=None)
         if self.is_central_front and outcome.verdict == Verdict.OPTIMAL:
             outcome = _with_enumerated_front(self, outcome)
-        now = team_after_events(self.original, outcome.events)
-        costs = objective_costs(now, outcome.assignment, outcome.withdrawn)
-        front = tuple([FrontPoint(objective_costs(now, one.assignment), one.assignment) for one in outcome.front])
-        check_front(now, front)
-        found = replace(outcome, objectives=costs, front=front)
+        events = accumulate((not epoch.lost for epoch in outcome.epochs), initial=0)
+        epochs = tuple(
+            [self._with_objectives(epoch, number) for epoch, number in zip(outcome.epochs, events, strict=False)]
+        )
+        found = replace(self._with_objectives(outcome, outcome.events), epochs=epochs)
         if self.mode.combination != Combination.WEIGHTED:  # combined costs are packed
-            first = (self.mode.order or self.original.objectives)[0]
-            stages = tuple([one._replace(cost=None) for one in outcome.stages])
-            epochs = tuple([self._epoch(events, epoch, first) for events, epoch in enumerate(outcome.epochs)])
-            found = replace(found, cost=costs[first], bound=None, stages=stages, epochs=epochs)
-        if front and self.options.verify and confirm_front(now, [one.objectives for one in front]):
+            found = replace(found, stages=tuple([one._replace(cost=None) for one in outcome.stages]))
+        if not outcome.front:
+            return found
+        front = tuple(
+            [FrontPoint(objective_costs(self.original, one.assignment), one.assignment) for one in found.front]
+        )
+        check_front(self.original, front)
+        found = replace(found, front=front)
+        if self.options.verify and confirm_front(self.original, [one.objectives for one in front]):
             confirmed = tuple(dict.fromkeys([*outcome.confirmed_by, ENUMERATION]))
             found = replace(found, confirmed=True, confirmed_by=confirmed)
         return found
 
-    def _epoch(self, events: int, epoch: EpochOutcome, first: str) -> EpochOutcome:
-        """Return an epoch, after this number of events, with the costs in each objective."""
-        if not epoch.assignment:
-            return replace(epoch, bound=None)
-        costs = objective_costs(team_after_events(self.original, events), epoch.assignment, epoch.withdrawn)
-        return replace(epoch, cost=costs[first], objectives=costs, bound=None)
+    def _with_objectives(self, answer: _Answer, events: int) -> _Answer:
+        """Return an answer, after this number of events, with the costs in each objective."""
+        single = self.mode.combination == Combination.WEIGHTED
+        if not answer.assignment:
+            return answer if single else replace(answer, bound=None)
+        now = team_after_events(self.original, events)
+        costs = objective_costs(now, answer.assignment, robots_without_values(now, answer.assignment))
+        if single:
+            return replace(answer, objectives=costs)
+        first = (self.mode.order or self.original.objectives)[0]
+        return replace(answer, objectives=costs, cost=costs[first], bound=None)
 
 
 ENUMERATION = "enumeration"
@@ -147,7 +157,7 @@ def with_single_cost(team: Team, mode: ObjectivesMode) -> Team:
     if {*mode.names} != {*team.objectives}:
         names = ", ".join(team.objectives)
         raise UnsupportedError(
-            f"{team.name} has the objectives {names}, and --objectives {mode} names others: name each"
+            f"{team.name} has the objectives {names}, and --objectives {mode} does not name exactly these: name each"
         )
     weights = dict(mode.weights)
     if mode.combination == Combination.LEXICOGRAPHIC:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from random import Random
@@ -13,11 +14,12 @@ from hypothesis import strategies as st
 import robochoc
 from robochoc.journal.journal import read_journal
 from robochoc.model.objectives import PARETO, ObjectivesMode, non_dominated, objectives_mode, place_values, unpacked
-from robochoc.model.outcome import Outcome, Verdict
+from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.problem import Team
 from robochoc.protocols.inference.mo_dpop import MODPOPSettings
 from robochoc.replay import replay
 from robochoc.run import Options, Runtime, solve
+from robochoc.run.objectives import combined_run
 from robochoc.run.options import ScheduleName
 from robochoc.solver.errors import UnsupportedError
 from robochoc.verification.checker import RefutedError
@@ -149,7 +151,7 @@ def trade_off(size: int = 3) -> robochoc.Model:
         ("auto", {"deadline": 1}, "--deadline cannot be combined"),
         ("auto", {"message_loss": 0.1}, "--message-loss cannot be combined"),
         ("auto", {"objectives": "weighted:energy=1"}, "has the objectives energy, risk"),
-        ("mo-dpop", {"settings": {"vectors": "3"}}, "more than 3 cost vectors"),
+        ("mo-dpop", {"settings": {"vectors": "3"}}, "more than 3 cost vectors.* or combine the objectives"),
         ("dpop", {"objectives": "weighted:energy=1000000000,risk=1000000000", "seed": 1}, ""),
     ],
 )
@@ -220,6 +222,39 @@ def test_epochs_have_the_costs_of_their_own_team() -> None:
         {"energy": 21, "risk": -42},
     ]
     assert [epoch.cost for epoch in solution.epochs] == [12, 21]
+
+
+def test_epochs_have_the_costs_in_each_objective_if_the_last_has_no_solution() -> None:
+    model = trade_off()
+    event = model.after_solution()
+    event.add(model["drone0.height"] == model["drone1.height"])
+    weighted = model.solve("dpop", objectives="weighted:energy=2,risk=1")
+    first, last = [epoch.objectives for epoch in weighted.epochs]
+    assert (2 * first["energy"] + first["risk"], last) == (-26, {})
+    lexicographic = model.solve("dpop", objectives="lexicographic:energy,risk")
+    assert lexicographic.verdict == Verdict.NO_SOLUTION
+    assert [epoch.cost for epoch in lexicographic.epochs] == [12, None]
+
+
+def test_costs_after_a_loss_are_those_of_the_other_robots() -> None:
+    team = trade_off().team
+    run = combined_run(team, Options(protocol="dpop", objectives=objectives_mode("lexicographic:risk,energy")))
+    assert run is not None
+    assignment = {"drone1.height": 5, "drone2.height": 5}
+    epochs = (
+        EpochOutcome(verdict=Verdict.UNKNOWN, robots=team.order, opened_by="", lost=("drone0",)),
+        EpochOutcome(
+            verdict=Verdict.OPTIMAL,
+            assignment=assignment,
+            cost=12345,
+            robots=("drone1", "drone2"),
+            opened_by="",
+        ),
+    )
+    found = simulated(team, "dpop", objectives="lexicographic:risk,energy")
+    outcome = run.outcome(replace(found, assignment=assignment, cost=12345, epochs=epochs, lost=("drone0",)))
+    assert (outcome.cost, outcome.objectives) == (-70, {"energy": 30, "risk": -70})
+    assert outcome.epochs[1].cost == -70
 
 
 @pytest.mark.parametrize("bases", ["0", "a", "1,2,3", "1,,2", str(2**63)])
