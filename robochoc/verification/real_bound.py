@@ -319,8 +319,8 @@ def _with_constraint(problem: _Problem, constraint: Constraint, unit: int, place
 
 def _divisor(constraint: Constraint) -> int:
     """Return the constant by which the value of a function is divided at last; 1 if there is none."""
-    match constraint.definition:
-        case Function(body=Apply("div", (_, Constant(divisor)))) if divisor > 0:
+    match constraint.definition, constraint.applied:
+        case Function(), Apply("div", (_, Constant(divisor))) if divisor > 0:
             return divisor
         case _:
             return 1

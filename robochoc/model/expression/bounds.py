@@ -120,8 +120,10 @@ def _truncated(dividend: int, divisor: int) -> int:
     return size if (dividend < 0) == (divisor < 0) else -size
 
 
-def _remainder(dividend: Interval, divisor: Interval) -> Interval:  # noqa: ARG001 - it has the dividend's sign
-    return Interval(min(0, dividend.low), max(0, dividend.high))
+def _remainder(dividend: Interval, divisor: Interval) -> Interval:
+    """Return the bounds of a remainder. It has the sign of the dividend, and is less than the divisor."""
+    most = max(_absolute(divisor).high - 1, 0)
+    return Interval(max(min(0, dividend.low), -most), min(max(0, dividend.high), most))
 
 
 def _square(part: Interval) -> Interval:

@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from decimal import Decimal
 
 import pytest
 
+from robochoc.model.assembly import assemble
+from robochoc.model.constraint import Constraint, Domain, Function, Variable
+from robochoc.model.cost_units import CostUnits
+from robochoc.model.expression import Type, parse
+from robochoc.model.expression.fixed_point import VALUE_PLACES, fixed_point
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import Team
+from robochoc.model.problem import ProblemKind, Team
+from robochoc.model.real import RealInterval, RealParameters, grid
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
 from robochoc.verification.checker import check_user_cost, violations
 from robochoc.verification.real_bound import certificate
 from tests.support.examples import are_the_same, drawn
-from tests.support.real_teams import best_cost, random_team
+from tests.support.real_teams import PLACES, best_cost, random_team
 
 
 def _check(team: Team, protocol: str) -> tuple[bool, bool]:
@@ -59,6 +66,22 @@ def test_answers_and_bounds_agree_with_enumeration() -> None:
     for number in range(12):
         team = random_team(chance, chance.randint(1, 2), 30)
         _check(team, ["dpop", "afb", "dsa"][number % 3])
+
+
+def test_bounds_of_quotients_by_constants_in_the_scope() -> None:
+    formals = ("X", "Y")
+    real = RealParameters(("X",), PLACES, source := parse("div(X, Y)", formals, Type.INTEGER, decimals=True))
+    body = fixed_point(source, ("X",), PLACES, Type.INTEGER, VALUE_PLACES)
+    function = Function("third", formals, body, real=real, places=VALUE_PLACES)
+    domain = Domain("D", grid(-9, -1, 3), real=RealInterval(-9, -1, PLACES))
+    third = Constraint("third", function, ("x",), ("x", 3))
+    for maximize, best in ((False, "-0.300000"), (True, "-0.033333")):
+        costs = CostUnits(maximize=maximize, places=VALUE_PLACES)
+        team = assemble("one", {"R": [Variable("x", domain)]}, [third], kind=ProblemKind.DISWCSP, costs=costs)
+        bound = certificate(team, {}).bound
+        assert bound is not None
+        assert best_cost(team) == Decimal(best)
+        assert 0 <= (bound - Decimal(best) if maximize else Decimal(best) - bound) <= Decimal("0.000001")
 
 
 @pytest.mark.slow
