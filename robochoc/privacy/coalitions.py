@@ -10,8 +10,9 @@ different senders' messages do not count. Fields that are masked by random numbe
 their length only: a minority would see the same distribution with any table.
 
 Random numbers of the other robots are unknown to a coalition. Each table is tried with several of them; a table with
-which none gives the same messages counts as excluded, although others might. So the share can be too high, but not too
-low, for protocols that draw random numbers; for others it is exact.
+which none gives the same messages counts as excluded, although others might. So too many tables can be excluded, but
+not too few, for protocols that draw random numbers; for others the number is exact. A table with which the protocol
+would refuse the run is excluded.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ from robochoc.protocols.message import Envelope
 from robochoc.protocols.protocol import Protocol
 from robochoc.sniffer.recorded_messages import types_by_name
 from robochoc.solver.agent_problem import AgentProblem, RunParameters, agent_problems
+from robochoc.solver.errors import TooLargeError
 from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.lazy_dataclass import dataclass
 
@@ -138,7 +140,10 @@ def coalition_report(
             changed = _with_constraints(team, table)
             alike = seen = False
             for coin in range(coins if actual.is_random else 1):
-                played = _play(changed, protocol, given, members, coin)
+                try:
+                    played = _play(changed, protocol, given, members, coin)
+                except TooLargeError:
+                    continue
                 alike = alike or played.result == actual.result
                 seen = played.view == actual.view and played.result == actual.result
                 if seen:

@@ -10,7 +10,8 @@ from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
-from robochoc.protocols.chance import Chance, one_of
+from robochoc.protocols.chance import UNIT, Chance
+from robochoc.protocols.key_stream import KeyStream, shuffled
 from robochoc.protocols.private.p_dsa import PDSA
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver.agent_problem import RunParameters
@@ -42,9 +43,9 @@ def random_costs(chance: Random) -> tuple[Costs, Team]:
 
 def dsa(costs: Costs, robots: int, seed: int) -> list[int]:
     """Return the values in the best cycle of DSA, variant A, with the random numbers of P-DSA's robots."""
-    chances = [Chance(seed, f"R{name}") for name in "ABCD"[:robots]]
-    values = [one_of(chance, [0, 1, 2]) for chance in chances]
-    coins = [[chance() < PROBABILITY for _ in range(CYCLES)] for chance in chances]
+    secrets = [KeyStream(seed, f"R{name}") for name in "ABCD"[:robots]]
+    values = [shuffled([0, 1, 2], secret)[0] for secret in secrets]
+    coins = [[secret(53) * UNIT < PROBABILITY for _ in range(CYCLES)] for secret in secrets]
 
     def number(cost: float) -> float:
         return 10**6 if cost == INFINITE else cost
@@ -76,6 +77,12 @@ def test_the_answer_is_that_of_dsa_on_known_values(number: int) -> None:
             found = simulation.search().assignments
         expected = dsa(costs, len(team.robots), seed)
         assert [found[f"R{name}"][name] for name in "ABCD"[: len(team.robots)]] == expected
+
+
+def test_nothing_is_drawn_from_numbers_that_all_robots_can_compute(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Chance, "__call__", lambda _: pytest.fail("the seed determines these numbers"))
+    _, team = random_costs(Random(1))
+    assert solve(team, options_of(cycles="1")).assignment
 
 
 def test_a_search_that_is_too_large_is_refused_before_it_begins() -> None:

@@ -33,7 +33,8 @@ def print_coalitions(report: CoalitionReport) -> None:
         click.echo(on_one_line(f"  {line}"))
     if not report.is_exact and any(one.excluded_by_messages for one in report.losses):
         tried = counted(report.coins, "seed")
-        click.echo(f"  the other robots draw random numbers, tried with {tried}: the shares may be too high (--coins)")
+        note = f"the other robots draw random numbers, tried with {tried}: more may exclude fewer tables (--coins)"
+        click.echo(f"  {note}")
 
 
 def _rows(report: CoalitionReport) -> Iterator[list[str]]:

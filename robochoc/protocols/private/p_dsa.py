@@ -1,9 +1,9 @@
 """P-DSA: DSA on shared secrets, private against every coalition of a minority of the robots.
 
 The search is DSA, variant A: in each cycle, each robot computes its best value given the present values of the others,
-and moves to it with a probability if this lowers its cost. But no robot knows a value, not even its own: all robots
-have shares of the codes of all values, and of all tables of costs, and compute the next codes together. Nothing is
-opened until the end, when each robot receives its value in the best cycle.
+and moves to it with a probability if this lowers its cost. But after the first cycle no robot knows a value, not
+even its own: all robots have shares of the codes of all values, and of all tables of costs, and compute the next codes
+together. Nothing is opened until the end, when each robot receives its value in the best cycle.
 
 - **When to use**: costs, three robots or more that may put together what they know, and too many for `pc-syncbb`.
 - **Guarantees**: incomplete; it stops after `cycles` cycles with the best of them, without a proof. Robots are assumed
@@ -31,6 +31,7 @@ The methods:
 Choices, and differences:
 
 - Constraints are over at most two robots.
+- The values of the first cycle and the chances to move are drawn like keys: all robots know the seed of `chance`.
 - If the best cycle has an impossible value of a robot, the robot takes its first possible value.
 - Of several best values the first declared one is taken.
 - The robots also compute the best cycle. The cost of a cycle is that before its moves.
@@ -53,7 +54,8 @@ from itertools import islice
 from typing import Any, ClassVar, NamedTuple
 
 from robochoc.model.outcome import Verdict
-from robochoc.protocols.chance import one_of
+from robochoc.protocols.chance import UNIT
+from robochoc.protocols.key_stream import shuffled
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.private.shared_arithmetic import Inputs, Output, SharedArithmeticMessage
 from robochoc.protocols.private.shared_costs import SharedCostsProtocol, Sizes, check_settings
@@ -136,9 +138,9 @@ class PDSA(SharedCostsProtocol):
         size = self.sizes[self.rank]
         start = self.problem.start
         places = {index: place for place, index in self.places.items()}
-        place = one_of(self.chance, [*self.places]) if start not in places else places[start]
+        place = shuffled([*self.places], self.secret)[0] if start not in places else places[start]
         inputs = [*self.alone, *(int(one == place) for one in range(size))]
-        inputs += [int(self.chance() < self.settings.probability) for _ in range(self.settings.cycles)]
+        inputs += [int(self.secret(53) * UNIT < self.settings.probability) for _ in range(self.settings.cycles)]
         for name, other in zip(self.order.names[: self.rank], self.sizes, strict=False):
             rows = self.rows.get((name,)) or [[0] * other] * size
             inputs += [cost for row in rows for cost in row]

@@ -105,6 +105,20 @@ def test_more_seeds_exclude_fewer_tables() -> None:
     assert few <= many
 
 
+def test_a_table_with_which_the_run_is_refused_is_excluded() -> None:
+    class Limited(PCSyncBB):
+        settings = PCSyncBBSettings(comparisons=4)
+
+        @property
+        def field(self) -> Field:
+            return field_of(19)
+
+    zeros = [priced(one, "B", {(1, two): 0 for two in (1, 2)}) for one in "AC"]
+    team = with_costs(team_of({"A": (1,), "B": (1, 2), "C": (1,)}, zeros))
+    for one in coalition_report(team, Limited, 1, costs=(0, 1)).losses:
+        assert 1 <= one.by_messages <= one.by_values < one.tables
+
+
 @pytest.mark.parametrize(
     "seeds", [range(1), *(pytest.param(range(at, at + 10), marks=SLOW) for at in range(0, 200, 10))]
 )
