@@ -154,6 +154,11 @@ def prepare(team: Team, options: Options, *, environment: bool = False, ordered:
     began = time.monotonic()
     if options.risk == Risk.WORST:
         team = _worst_case(team)
+        if (
+            options.withdraw is not None or options.survives_losses or environment
+        ):  # a table ends with any of its robots
+            what = "robots cannot withdraw, be lost or leave during a run"
+            raise UnsupportedError(f"with --risk worst, {what}: use --risk expected")
     run = None
     if team.objectives or options.objectives is not None:
         from robochoc.run.objectives import combined_run  # noqa: PLC0415 - start-up: rarely needed

@@ -19,8 +19,8 @@ from robochoc.formats.team_writer import write_team
 from robochoc.model.policies import Risk
 from robochoc.model.random_variable import RandomVariable
 from robochoc.model.uncertainty import is_uncertain
-from robochoc.run.options import Options, Runtime
-from robochoc.run.orchestrator import solve
+from robochoc.run.options import OnLoss, Options, Runtime, Withdrawal
+from robochoc.run.orchestrator import prepare, solve
 from robochoc.solver.errors import UnsupportedError
 from tests.support.cases import looped
 from tests.support.examples import drawn
@@ -141,6 +141,13 @@ def test_a_robot_with_random_variables_must_be_converted() -> None:
 def test_the_worst_case_is_limited_and_needs_random_variables() -> None:
     with pytest.raises(UnsupportedError, match="scouts has no random variables"):
         solve(read_team(ROOT / "docs" / "examples" / "scouts"), replace(SIMULATED, risk=Risk.WORST))
+
+
+def test_robots_stay_in_the_worst_case() -> None:
+    worst = replace(SIMULATED, risk=Risk.WORST)
+    for options in (replace(worst, withdraw=Withdrawal.MINIMUM), replace(worst, on_loss=OnLoss.WITHDRAW)):
+        with pytest.raises(UnsupportedError, match="robots cannot withdraw, be lost or leave"):
+            prepare(read_team(GUSTS), options)
 
 
 def test_a_report_names_costs_only_if_there_are_any() -> None:
