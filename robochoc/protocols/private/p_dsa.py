@@ -57,7 +57,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.protocols.chance import UNIT
 from robochoc.protocols.key_stream import shuffled
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.private.shared_arithmetic import Inputs, Output, SharedArithmeticMessage
+from robochoc.protocols.private.shared_arithmetic import Inputs, Masked, Opened, Output, Randomness
 from robochoc.protocols.private.shared_costs import SharedCostsProtocol, Sizes, check_settings
 from robochoc.protocols.settings import Settings
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
@@ -96,7 +96,7 @@ class PDSA(SharedCostsProtocol):
     best cycle (`best_codes`) with its cost (`best_cost`, twice the cost); shares of all tables.
     """
 
-    messages: ClassVar[Any] = SharedArithmeticMessage | Sizes
+    messages: ClassVar[Any] = Randomness | Inputs | Masked | Opened | Output | Sizes
     traits: ClassVar[Traits] = Traits(
         complete=False,
         concludes=ENDS_WITH_PROOF,

@@ -18,6 +18,7 @@ from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.problem import Team
 from robochoc.protocols.message import Envelope, Message, encode
+from robochoc.protocols.private.p_dsa import PDSA
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.mediation import AllowedTable
 from robochoc.protocols.shared.anytime import AnytimeMessage
@@ -94,6 +95,8 @@ def other_settings(protocol: type[Protocol]) -> dict[str, str]:
         return {"heuristic": "dp"}
     if hasattr(protocol.settings, "search"):
         return {"search": "hidden"}
+    if protocol is PDSA:
+        return {"cycles": "1"}
     anytime = {kind.__name__ for kind in get_args(AnytimeMessage)}
     return {"anytime": "yes", "cycles": "4"} if anytime <= {kind.__name__ for kind in types_of(protocol)} else {}
 
