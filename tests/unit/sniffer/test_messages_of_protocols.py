@@ -115,7 +115,7 @@ def messages_of_random_runs_are_the_same_again(protocol: str) -> None:
         schedule = Recording(seed)
         team, settings = a_team(offered, chance), other_settings(offered) if seed % 2 else {}
         with Simulation(team, offered, schedule, parameters=RunParameters(settings=settings)) as session:
-            session.search(messages=800)
+            session.search(messages=4_000 if settings else 800)
         for kind, envelopes in schedule.seen.items():
             seen.add(kind)
             for number, envelope in enumerate(envelopes.values()):
