@@ -52,12 +52,17 @@ def solve_centrally(team: Team, context: RunContext, header: Outcome) -> Outcome
         decisions = [_decide(solver, team_after_events(team, number), context) for number in range(last + 1)]
     answer, solutions = decisions[-1]
     epochs = tuple(
-        decision.answer.as_epoch(team_after_events(team, number).order, _opened_by(team, number))
+        _shown(decision.answer, team, context).as_epoch(team_after_events(team, number).order, _opened_by(team, number))
         for number, decision in enumerate(decisions)
     )
     spent = sum((epoch.metrics for epoch in epochs), Metrics())
     answer = replace(answer, metrics=spent, epochs=epochs if team.dynamic else ())
+    answer = _shown(answer, team, context)
     return replace(answer.as_outcome(header, ()), runtime=CENTRAL, count=solutions)
+
+
+def _shown(answer: PhaseAnswer, team: Team, context: RunContext) -> PhaseAnswer:
+    return answer.on_grid() if context.is_on_grid(team) else answer
 
 
 def _opened_by(team: Team, number: int) -> str:

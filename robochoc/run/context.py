@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 from robochoc.communication.kill_schedule import KillSchedule
 from robochoc.communication.search_result import Progress
 from robochoc.journal.events import Observer
+from robochoc.model.problem import Team
+from robochoc.model.symbols import real_places
 from robochoc.run.options import CentralSolverName, Options
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.compile import TeamCompiler
@@ -29,6 +31,8 @@ class RunContext:
         progress: Receives the number of messages and the stage of the run from time to time.
         solver: A constraint solver that is already running. None: a solver is started when it is needed.
         spent_s: The seconds that the run had already taken when the context was created.
+        proves_reals: True if the caller proves verdicts and bounds for real variables itself. Otherwise the outcome
+            contains no proofs that hold on a grid only.
     """
 
     def __init__(
@@ -38,9 +42,12 @@ class RunContext:
         progress: Callable[[Progress], None] | None = None,
         solver: AceProcess | None = None,
         spent_s: float = 0.0,
+        *,
+        proves_reals: bool = False,
     ) -> None:
         self.options = options
         self.observer = observer
+        self.proves_reals = proves_reals
         self.progress = progress
         self.solver = solver
         self.cache = SolutionCache() if options.cache else None
@@ -52,6 +59,10 @@ class RunContext:
         self.began = time.monotonic() - spent_s
         limit_s = self.options.limit_s
         self.deadline = None if limit_s is None else self.began + limit_s
+
+    def is_on_grid(self, team: Team) -> bool:
+        """Return whether answers hold only on grids of real variables, and nobody proves more."""
+        return not self.proves_reals and bool(real_places(team))
 
     def left_s(self) -> float | None:
         """Return the remaining seconds; None if there is no limit."""

@@ -68,6 +68,11 @@ class Deployment(ABC):
     def is_empty(self) -> bool:
         """Return whether no robot is left."""
 
+    @property
+    @abstractmethod
+    def is_on_grid(self) -> bool:
+        """Return whether the answer holds only on grids of real variables."""
+
     @abstractmethod
     def withdrawal_cost(self) -> float:
         """Return the withdrawal cost of a robot of weight 1. It exceeds the sum of the costs of all constraints."""
@@ -209,7 +214,8 @@ class Deployment(ABC):
     def outcome(self, header: Outcome, answer: PhaseAnswer) -> Outcome:
         """Return `header`, which describes the run, completed by `answer`."""
         metrics = replace(answer.metrics, compile_s=self.compile_s)
-        return replace(answer, metrics=metrics, count=self._count(answer)).as_outcome(header, self.lost)
+        answer = replace(answer, metrics=metrics, count=self._count(answer))
+        return (answer.on_grid() if self.is_on_grid else answer).as_outcome(header, self.lost)
 
     def _count(self, answer: PhaseAnswer) -> int | None:
         """Return the number of solutions or optima if the options require it and the number is known."""

@@ -61,6 +61,10 @@ class Search(NamedTuple):
     nearest: Callable[[], Nearest | None] = _nothing_known
 
 
+NOT_ON_GRIDS = "no point of the grids is a solution, and other points could not be excluded"
+"""The reason why the verdict is `UNKNOWN` although the grids of real variables have no solution."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class PhaseAnswer(Answer):
     """The answer of a phase of a run. `withdrawn` contains the robots that withdrew, without lost robots.
@@ -98,6 +102,18 @@ class PhaseAnswer(Answer):
         if found.bound is not None and found.cost == found.bound:
             return replace(found, verdict=Verdict.OPTIMAL, bound=None)
         return found
+
+    def on_grid(self) -> PhaseAnswer:
+        """Return this answer without proofs: it holds on grids of real variables, and not for other real numbers."""
+        bare = replace(self, bound=None, confirmed=False, confirmed_by=())
+        match self.verdict:
+            case Verdict.OPTIMAL:
+                found = [one._replace(verdict=Verdict.SOLUTION) for one in self.improvements]
+                return replace(bare, verdict=Verdict.SOLUTION, improvements=tuple(found))
+            case Verdict.NO_SOLUTION:
+                return replace(bare, verdict=Verdict.UNKNOWN, witness=None, verified=False, reason=NOT_ON_GRIDS)
+            case _:
+                return bare
 
     def as_epoch(self, robots: tuple[str, ...], opened_by: str = "the start", lost: Sequence[str] = ()) -> EpochOutcome:
         """Return the epoch that ended with this answer. Preprocessing is reported once, for the whole run."""

@@ -29,7 +29,7 @@ from robochoc.run.defaults import CENTRAL
 from robochoc.run.distributed import solve_distributed
 from robochoc.run.improvement import Audience
 from robochoc.run.options import Options
-from robochoc.run.refinement import numbered, refines, solve_on_grids, without_proof
+from robochoc.run.refinement import numbered, refines, solve_on_grids
 from robochoc.run.registry import protocol_named
 from robochoc.run.scenario import Environment
 from robochoc.run.this_machine import ThisMachine
@@ -122,12 +122,13 @@ class PreparedRun:
 
             def solve_grid(team: Team, options: Options, number: int, opened_by: str) -> Outcome:
                 spent_s = time.monotonic() - began
-                context = RunContext(options, numbered(observer, number, opened_by), progress, solver, spent_s)
+                own = numbered(observer, number, opened_by)
+                context = RunContext(options, own, progress, solver, spent_s, proves_reals=True)
                 return _solved(team, context, None, audience)
 
             return solve_on_grids(self.team, self.choice.options, solve_grid)
         context = RunContext(self.choice.options, observer, progress, solver, self.spent_s)
-        outcome = without_proof(self.team, _solved(self.team, context, environment, audience))
+        outcome = _solved(self.team, context, environment, audience)
         if self.uncertain and outcome.assignment and not outcome.epochs:
             from robochoc.verification.policies import policy_report  # noqa: PLC0415 - start-up: rarely needed
 

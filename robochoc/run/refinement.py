@@ -19,7 +19,9 @@ from robochoc.model.constraint import Domain, united_ranges
 from robochoc.model.outcome import GridSearch, Outcome, Verdict
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.model.real import RealInterval
+from robochoc.model.symbols import real_places
 from robochoc.run.defaults import CENTRAL
+from robochoc.run.evaluation import NOT_ON_GRIDS
 from robochoc.run.options import Options
 from robochoc.solver.agent_problem import StartValues
 
@@ -67,18 +69,7 @@ def refines(team: Team, options: Options) -> bool:
     """
     if team.dynamic or options.count or options.improve is not None or options.refine == math.inf:
         return False
-    return _has_reals(team)
-
-
-def without_proof(team: Team, outcome: Outcome) -> Outcome:
-    """Return the outcome on the grids of the files, which proves nothing about other real numbers."""
-    if outcome.verdict != Verdict.OPTIMAL or not _has_reals(team):
-        return outcome
-    return replace(outcome, verdict=Verdict.SOLUTION, confirmed=False, confirmed_by=())
-
-
-def _has_reals(team: Team) -> bool:
-    return any(variable.domain.real for variable in team.variables.values())
+    return bool(real_places(team))
 
 
 def solve_on_grids(team: Team, options: Options, solve_grid: SolveGrid) -> Outcome:
@@ -95,7 +86,7 @@ def solve_on_grids(team: Team, options: Options, solve_grid: SolveGrid) -> Outco
         grids |= {name: _first_grid(interval, domain, len(real)) for name, domain, interval in real}
     scale = 10 ** max(grid.real.places for grid in grids.values())
     least = max(1, round((options.refine or 0) * scale))
-    team_now, options = _with_values(team, options.start, grids), replace(options, verify=False)
+    team_now = _with_values(team, options.start, grids)
     best: Outcome | None = None
     history: list[GridSearch] = []
     moves = 0
@@ -220,14 +211,13 @@ def _certified(team: Team, best: Outcome) -> Outcome:
     if proof.is_infeasible:
         return replace(best, verdict=Verdict.NO_SOLUTION, verified=True, witness=None, reason=_INFEASIBLE)
     if best.verdict == Verdict.NO_SOLUTION:
-        return replace(best, verdict=Verdict.UNKNOWN, witness=None, verified=False, reason=_NOT_ON_GRIDS)
+        return replace(best, verdict=Verdict.UNKNOWN, witness=None, verified=False, reason=NOT_ON_GRIDS)
     if best.verdict == Verdict.SOLUTION and proof.bound == best.cost:
         return replace(best, verdict=Verdict.OPTIMAL)
     return replace(best, bound=proof.bound)
 
 
 _INFEASIBLE = "interval arithmetic excludes all values of the real variables"
-_NOT_ON_GRIDS = "no point of the grids is a solution, and other points could not be excluded"
 
 
 def numbered(observer: Observer | None, number: int, opened_by: str) -> Observer | None:

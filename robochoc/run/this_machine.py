@@ -145,6 +145,11 @@ class ThisMachine(Deployment):
         return tuple(self._scenario.lost_for_good)
 
     @property
+    def is_on_grid(self) -> bool:
+        """See `Deployment.is_on_grid`."""
+        return self._context.is_on_grid(self._team)
+
+    @property
     def is_empty(self) -> bool:
         """See `Deployment.is_empty`."""
         return not self._scenario.team.robots
@@ -290,7 +295,8 @@ class ThisMachine(Deployment):
             start_epoch = partial(self._start_epoch, phase, session)
             for epoch in scenario.epochs(session, start_epoch, phase.parameters):
                 answer, lost = self._answer_of(phase, epoch), epoch.result.lost
-                self.epochs.append(answer.as_epoch(epoch.team.order, epoch.opened_by, tuple(lost)))
+                shown = answer.on_grid() if self.is_on_grid else answer
+                self.epochs.append(shown.as_epoch(epoch.team.order, epoch.opened_by, tuple(lost)))
                 if self._dynamic or lost:
                     self._restart()
                     self._ask_environment()
@@ -358,6 +364,7 @@ class ThisMachine(Deployment):
         def publish(answer: PhaseAnswer, improvements: tuple[Improvement, ...]) -> None:
             if audience is not None:
                 now = replace(answer, improvements=improvements)
+                now = now.on_grid() if self.is_on_grid else now
                 audience.improve(team, now.as_epoch(team.order, start.opened_by or "the start"), answer.withdrawn)
 
         session.watch = self._improvements = improvements_of(

@@ -20,6 +20,7 @@ from robochoc.model.cost_units import MAX_PLACES, CostUnits
 from robochoc.model.costs import flat_units
 from robochoc.model.priorities import CycleError, priority_order
 from robochoc.model.problem import Child, Constraint, Domain, Parent, ProblemKind, Robot, Team, Variable, WhenAbsent
+from robochoc.model.real import MOST_PLACES, RealInterval
 from robochoc.solver.encoding import Cost, max_cost
 from robochoc.system.errors import RobochocError
 
@@ -52,6 +53,8 @@ class Profile(msgspec.Struct, frozen=True, array_like=True):
     without violations. `topics` are the topics in its decision. `cost_scale` contains its cost units: whether the sum
     is maximised, the decimal places, and a constant. `symbols` are the names of the team's symbols, in the order of
     their codes; empty if the robot knows no symbols. `symbolic` are those `variables` whose values are symbol codes.
+    `real_places` are the decimal places of those `variables` whose values are real numbers; `on_grid` is true if any of
+    the robot's variables, including hidden ones, is a real number, of which only a grid is searched.
     """
 
     name: str
@@ -67,6 +70,8 @@ class Profile(msgspec.Struct, frozen=True, array_like=True):
     cost_scale: tuple[bool, int, int] = (False, 0, 0)
     symbols: tuple[str, ...] = ()
     symbolic: tuple[str, ...] = ()
+    real_places: dict[str, int] = {}
+    on_grid: bool = False
 
     @property
     def units(self) -> CostUnits:
@@ -105,6 +110,8 @@ def profile_of(robot: Robot) -> Profile:
         cost_scale=(units.maximize, units.places, units.constant),
         symbols=robot.symbol_table,
         symbolic=tuple(v.name for v in robot.variables if v.name in shown and v.domain.symbols),
+        real_places={v.name: v.domain.real.places for v in robot.variables if v.name in shown and v.domain.real},
+        on_grid=any(v.domain.real for v in robot.variables),
     )
 
 
@@ -147,6 +154,8 @@ def visible_robot(profile: Profile, also: Mapping[str, Ranges]) -> Robot:
         raise ProfileError("its cost units are out of range")
     if not (0 <= profile.max_cost <= LARGEST_DEAREST and 1 <= profile.weight <= LARGEST_WEIGHT):
         raise ProfileError(f"costs of {profile.max_cost:g} or a weight of {profile.weight} are out of range")
+    if any(not 0 <= places <= MOST_PLACES for places in profile.real_places.values()):
+        raise ProfileError(f"real numbers have 0 to {MOST_PLACES} decimal places")
     _check_symbols(profile)
     shown = {**profile.variables, **also}
     return Robot(
@@ -172,8 +181,11 @@ def _check_symbols(profile: Profile) -> None:
 
 
 def _domain_in(profile: Profile, name: str, ranges: Ranges) -> Domain:
-    """Return the domain of the variable `name` in `profile`, including its symbols. Raises `ProfileError`."""
+    """Return the domain of the variable `name` in `profile`, with symbols and real numbers. Raises `ProfileError`."""
     domain = domain_of(name, ranges)
+    if name in profile.real_places:
+        low, high = domain.ranges[0][0], domain.ranges[-1][-1]
+        return replace(domain, real=RealInterval(low, high, profile.real_places[name]))
     if name not in profile.symbolic:
         return domain
     if not 0 <= domain.ranges[0][0] <= domain.ranges[-1][-1] < len(profile.symbols):

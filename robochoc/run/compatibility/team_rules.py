@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from robochoc.model.change import team_after_events
 from robochoc.model.problem import ProblemKind, Team
+from robochoc.model.symbols import real_places
 from robochoc.protocols.requirements import BREAKABLE, unmet_requirement
 from robochoc.protocols.satisfaction.disac import DisAC
 from robochoc.protocols.satisfaction.first_fit import FirstFit
@@ -121,6 +122,11 @@ TEAM_RULES = (
     ),
     _not_with_scenario("--runtime network", lambda o: o.protocol != CENTRAL and o.runtime == Runtime.NETWORK),
     _not_with_scenario("--runtime arrays", lambda o: o.protocol != CENTRAL and o.runtime == Runtime.ARRAYS),
+    TeamRule(
+        lambda c: c.options.verify and real_places(c.team),
+        "--verify confirms optima of integer variables, and {team} has real variables, whose bound takes its place",
+        "remove --verify",
+    ),
     TeamRule(lambda c: c.traits.lacks, "{protocol} needs {case.traits.lacks}"),
     TeamRule(
         lambda c: c.is_distributed and c.options.runtime == Runtime.ARRAYS and not c.traits.arrays,

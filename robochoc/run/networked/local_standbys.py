@@ -119,7 +119,7 @@ def solve_with_standbys(team: Team, context: RunContext, header: Outcome) -> Out
     finally:
         site.close()
     context.kills.warn_of_pending()
-    known = ("order", "chosen", "symbols", "symbolic")
+    known = ("order", "chosen", "symbols", "symbolic", "real_places")
     outcome = replace(outcome, **{name: getattr(header, name) for name in known})
     if outcome.verdict in {Verdict.SOLUTION, Verdict.OPTIMAL}:
         wrong = next(violations(compiled.team, outcome.assignment, {*outcome.withdrawn, *outcome.lost}), None)

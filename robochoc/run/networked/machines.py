@@ -98,6 +98,11 @@ class Machines(Deployment):
         return not self._master.members.robots
 
     @property
+    def is_on_grid(self) -> bool:
+        """See `Deployment.is_on_grid`."""
+        return any(member.profile.on_grid for member in self._master.members.robots.values())
+
+    @property
     def unsettled(self) -> str:
         """See `Deployment.unsettled`."""
         return self._master.state.unfinished
@@ -152,6 +157,7 @@ class Machines(Deployment):
             self._adopt(answer)
             if audience is not None and options.improve is not None:
                 now = replace(answer, improvements=improvements)
+                now = now.on_grid() if self.is_on_grid else now
                 audience.improve(team, now.as_epoch(team.order), answer.withdrawn)
 
         def keep(answer: PhaseAnswer) -> None:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from decimal import Decimal
+from random import Random
 
+import msgspec
 import pytest
 
+from robochoc.communication.network.profile import ProfileError, profile_of, visible_robot
 from robochoc.model.assembly import assemble
 from robochoc.model.constraint import Constraint, Domain, Function, Variable
 from robochoc.model.cost_units import CostUnits
@@ -15,8 +19,10 @@ from robochoc.model.expression.fixed_point import VALUE_PLACES, fixed_point
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.model.real import RealInterval, RealParameters, grid
+from robochoc.model.symbols import real_places
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
+from robochoc.solver.errors import UnsupportedError
 from robochoc.verification.checker import check_user_cost, violations
 from robochoc.verification.real_bound import certificate
 from tests.support.examples import are_the_same, drawn
@@ -94,3 +100,24 @@ def test_300_small_teams() -> None:
         proven, best = proven + is_proven, best + is_best
     if are_the_same():
         assert (proven, best) == (288, 295)
+
+
+@pytest.mark.parametrize("protocol", ["dpop", "central"])
+def test_grids_that_are_not_refined_prove_nothing(protocol: str) -> None:
+    team = random_team(Random(1), 2, 30)
+    options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, refine=math.inf)
+    outcome = solve(team, options)
+    assert outcome.verdict in {Verdict.SOLUTION, Verdict.UNKNOWN}
+    assert outcome.bound is None
+    with pytest.raises(UnsupportedError, match="--verify confirms optima of integer variables"):
+        solve(team, replace(options, verify=True))
+
+
+def test_the_master_learns_of_real_variables_from_profiles() -> None:
+    team = random_team(Random(1), 2, 30)
+    profiles = [profile_of(robot) for robot in team.robots]
+    assert all(one.on_grid for one in profiles)
+    shown = Team(team.name, tuple(visible_robot(one, {}) for one in profiles))
+    assert real_places(shown) == {name: 1 for one in profiles for name in one.variables}
+    with pytest.raises(ProfileError, match="decimal places"):
+        visible_robot(msgspec.structs.replace(profiles[0], real_places={"x": 99}), {})
