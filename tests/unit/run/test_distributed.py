@@ -57,6 +57,10 @@ class MadeUp(Deployment):
         return tuple(self._lost)
 
     @property
+    def is_on_grid(self) -> bool:
+        return False
+
+    @property
     def is_empty(self) -> bool:
         return not self._robots
 
