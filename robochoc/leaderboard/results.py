@@ -165,7 +165,7 @@ def read_results(path: Path) -> LeaderboardResults:
 
 
 def _check(found: LeaderboardResults, path: Path) -> None:
-    """Raise `InvalidInputError` for another version, an unknown instance or protocol, or a repeated run."""
+    """Raise `InvalidInputError` for another version, an unknown instance or protocol, or a repeated or missing run."""
     if (found.format, found.benchmark_set) != (FORMAT, SET_VERSION):
         text = f"has format {found.format} and set {found.benchmark_set}, not format {FORMAT} and set {SET_VERSION}"
         raise _invalid(path, text)
@@ -181,6 +181,10 @@ def _check(found: LeaderboardResults, path: Path) -> None:
         if (run.instance, run.protocol) in seen:
             raise _invalid(path, f"has two runs of {run.protocol} on {run.instance}")
         seen.add((run.instance, run.protocol))
+    for name in sorted({run.instance for run in found.runs}):  # runs that are left out would improve the ranks
+        for one in found.entrants:
+            if (name, one.name) not in seen:
+                raise _invalid(path, f"has no run of {one.name} on {name}, unlike its other entrants")
 
 
 def _invalid(path: Path, message: str) -> InvalidInputError:

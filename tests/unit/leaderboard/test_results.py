@@ -174,6 +174,7 @@ def test_invalid_files_are_refused(results: LeaderboardResults, tmp_path: Path) 
             ({**plain, "runs": [{**first, "instance": "nothing"}]}, "is not an instance of the set"),
             ({**plain, "runs": [{**first, "protocol": "abt"}]}, "is not among its entrants"),
             ({**plain, "runs": [first, first]}, "has two runs of dpop"),
+            ({**plain, "runs": plain["runs"][1:]}, "has no run of dpop on"),
             ({**plain, "entrants": plain["entrants"] * 2}, "names an entrant twice"),
             ({**plain, "runs": [{**first, "cost": 2**60}]}, "has no valid results"),
             ({**plain, "runs": [{**first, "protocol": "\x1b[31m"}]}, "has no valid results"),
@@ -192,8 +193,14 @@ def test_invalid_files_are_refused(results: LeaderboardResults, tmp_path: Path) 
 
 def test_a_board_has_each_run_once(results: LeaderboardResults, tmp_path: Path) -> None:
     board = tmp_path / "board"
-    one = msgspec.structs.replace(results, runs=[run for run in results.runs if run.protocol == "dpop"])
-    other = msgspec.structs.replace(results, runs=[run for run in results.runs if run.protocol != "dpop"])
+    one, other = (
+        msgspec.structs.replace(
+            results,
+            entrants=[entrant for entrant in results.entrants if (entrant.name == "dpop") is is_dpop],
+            runs=[run for run in results.runs if (run.protocol == "dpop") is is_dpop],
+        )
+        for is_dpop in (True, False)
+    )
     submit(one, "one.json", board)
     submit(other, "other.json", board)
     submit(one, "one.json", board)
