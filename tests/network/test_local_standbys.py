@@ -14,6 +14,7 @@ from robochoc.communication.search_result import RobotsLostError
 from robochoc.communication.simulator.channel import CHANNELS
 from robochoc.journal.events import AnyEvent
 from robochoc.model.outcome import Verdict
+from robochoc.model.policies import Risk
 from robochoc.protocols.traits import Traits
 from robochoc.run.compatibility.option_rules import refuse_options
 from robochoc.run.compatibility.team_rules import refuse_unfit
@@ -66,9 +67,12 @@ GIVEN: dict[str, object] = {
     "start": {"A": 1},
     "cold": True,
     "stages": (),
+    "risk": Risk.WORST,
+    "objectives": "pareto",
+    "refine": 0.1,
 }
 """A value of each option that differs from the default, where there is one."""
-USED_BY_THE_PARENT = {"local", "cache", "order", "kill", "standby", "chosen"}
+USED_BY_THE_PARENT = {"local", "cache", "order", "kill", "standby", "chosen", "risk", "objectives", "refine"}
 WITHOUT_EFFECT = {"cold", "stages"}
 """Options for teams with a scenario and for stages, which do not exist on a network."""
 
