@@ -96,6 +96,7 @@ class Solvable(ABC):
         repair: bool = True,
         risk: str = Risk.EXPECTED,
         objectives: str | None = None,
+        refine: float | None = None,
         cluster: str | None = None,
         journal: Path | str | None = None,
         html: Path | str | None = None,
@@ -160,6 +161,8 @@ class Solvable(ABC):
             risk: The minimised cost of a problem with random variables: `expected`, or `worst` of all scenarios.
             objectives: The treatment of several objectives: `weighted:NAME=WEIGHT,...`, `lexicographic:NAME,...` or
                 `pareto`. None: `pareto`, if there are several.
+            refine: The step of the finest grids of real variables, in their unit. None: their precision; infinite: the
+                grids of the files are not refined.
             cluster: With arrays: the address of a Dask scheduler, or the path of its file. Its workers compute the run.
                 None: this process does.
             journal: The file to which the journal of the run is written: all messages and decisions.

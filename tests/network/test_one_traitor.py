@@ -12,7 +12,7 @@ import pytest
 
 from robochoc.cli.reports.outcome import outcome_report
 from robochoc.communication.control import Conclusion
-from robochoc.communication.network.control_messages import Charge, CheckResult
+from robochoc.communication.network.control_messages import Charge, CheckResult, Spent
 from robochoc.communication.network.master import Master
 from robochoc.communication.processes.processes import ProcessesRun
 from robochoc.communication.search_result import RobotsLostError, SearchResult
@@ -140,7 +140,7 @@ def machines(checks: dict[str, CheckResult]) -> Machines:
     """The three robots, who have checked what they had."""
     members = SimpleNamespace(order=("RA", "RB", "RC"), robots={})
     snapshots = SimpleNamespace(number=1, checks=checks)
-    master = cast("Master", SimpleNamespace(members=members, snapshots=snapshots))
+    master = cast("Master", SimpleNamespace(members=members, snapshots=snapshots, spent_before=Spent()))
     return Machines(master, Options(protocol="abt", deadline=1), "t", None)
 
 
