@@ -112,7 +112,8 @@ def contradicted_claims(journal: Journal, runs: Sequence[ReplayedRun], *, is_com
     for number, epoch in enumerate(outcome.epochs):
         if number in last:
             yield from _answer_contradictions(f"epoch {number}'s ", epoch, _with_repair(epoch, runs, last[number]))
-    yield from _answer_contradictions("the outcome's ", outcome, _with_repair(outcome, runs, runs[-1]))
+    final = _with_repair(outcome, runs, runs[-1])
+    yield from _answer_contradictions("the outcome's ", outcome, _on_grids(outcome, runs, final))
 
 
 def _with_repair(recorded: Answer, runs: Sequence[ReplayedRun], last: ReplayedRun) -> ReplayedRun:
@@ -182,6 +183,19 @@ def _header_contradictions(
     order = runs[0].given.order if runs and runs[0].given else None
     if order is not None and isinstance(header.order, tuple) and header.order != order:
         yield Contradiction(what="the header's order", recorded=header.order, replayed=order)
+
+
+def _on_grids(outcome: Outcome, runs: Sequence[ReplayedRun], last: ReplayedRun) -> ReplayedRun:
+    """Return the run on the grid of real variables that found the answer, with the verdict of the outcome.
+
+    A grid neither proves nor disproves the verdict, which holds for all real numbers. Other problems have no grids:
+    their `last` run is returned.
+    """
+    if not outcome.real_places or outcome.epochs:
+        return last
+    found = [one for one in (last, *reversed(runs)) if one.answer and one.answer.assignment == outcome.assignment]
+    best = found[0] if found else last
+    return replace(best, answer=best.answer and replace(best.answer, verdict=outcome.verdict))
 
 
 def _answer_contradictions(whose: str, recorded: Answer, last: ReplayedRun) -> Iterator[Contradiction]:

@@ -5,27 +5,34 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from decimal import Decimal
+from pathlib import Path
 from random import Random
 
 import msgspec
 import pytest
 
 from robochoc.communication.network.profile import ProfileError, profile_of, visible_robot
+from robochoc.generators.swarm import swarm
+from robochoc.journal.journal import JournalRecorder, read_journal
 from robochoc.model.assembly import assemble
 from robochoc.model.constraint import Constraint, Domain, Function, Variable
 from robochoc.model.cost_units import CostUnits
+from robochoc.model.costs import normalized
 from robochoc.model.expression import Type, parse
 from robochoc.model.expression.fixed_point import VALUE_PLACES, fixed_point
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.model.real import RealInterval, RealParameters, grid
 from robochoc.model.symbols import real_places
+from robochoc.replay import replay
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
+from robochoc.run.recording import journal_header, objective_to_record
 from robochoc.solver.errors import UnsupportedError
 from robochoc.verification.checker import check_user_cost, violations
 from robochoc.verification.real_bound import certificate
 from tests.support.examples import are_the_same, drawn
+from tests.support.foreign_problems import imported, written
 from tests.support.real_teams import PLACES, best_cost, random_team
 
 
@@ -121,3 +128,23 @@ def test_the_master_learns_of_real_variables_from_profiles() -> None:
     assert real_places(shown) == {name: 1 for one in profiles for name in one.variables}
     with pytest.raises(ProfileError, match="decimal places"):
         visible_robot(msgspec.structs.replace(profiles[0], real_places={"x": 99}), {})
+
+
+def test_journals_of_refined_runs_replay_and_a_wrong_cost_is_found() -> None:
+    team = swarm(agents=3)
+    for protocol, error in (("dpop", 0), ("dsa", 0), ("dpop", 1)):
+        options = Options(protocol=protocol, runtime=Runtime.SIMULATOR)
+        recorder = JournalRecorder(journal_header(team, options), objective_to_record(normalized(team), options))
+        outcome = solve(team, options, observer=recorder)
+        assert outcome.cost is not None
+        recorder.outcome = replace(outcome, cost=outcome.cost - error)
+        again = replay(read_journal(recorder.content()))
+        assert not again.differs or error
+        assert len(again.contradictions) == error, again
+
+
+def test_teams_exported_to_pydcop_can_be_imported(tmp_path: Path) -> None:
+    team = swarm(agents=2)
+    (file,) = written("pydcop", team).values()
+    again = imported(file.decode(), tmp_path, "swarm.yaml").team
+    assert [len(one.domain) for one in again.variables.values()] == [len(one.domain) for one in team.variables.values()]

@@ -103,7 +103,7 @@ def _constraint(one: TabulatedConstraint, team: Team, forbidden: str) -> Iterato
     domains = [team.variables[name].domain for name in one.scope]
     by_cost: dict[str, list[str]] = defaultdict(list)
     for values, cost in one.table.rows.items():
-        words = [str(domain.label(value)) for domain, value in zip(domains, values, strict=True)]
+        words = [_value(domain, value) for domain, value in zip(domains, values, strict=True)]
         by_cost[_cost(cost, forbidden)].append(" ".join(words))
     yield f"  {_quoted(one.name)}:"
     yield "    type: extensional"
@@ -119,9 +119,13 @@ def _cost(cost: Amount, forbidden: str) -> str:
     return forbidden if cost == INFINITE else decimal(cost)
 
 
+def _value(domain: Domain, value: int) -> str:
+    return str(domain.label(value)) if domain.symbols else str(value)
+
+
 def _values(domain: Domain) -> str:
     if domain.symbols:
-        return f"[{', '.join(_quoted(str(domain.label(value))) for value in domain)}]"
+        return f"[{', '.join(_quoted(_value(domain, value)) for value in domain)}]"
     if len(domain.ranges) == 1:
         return f'["{domain.ranges[0][0]}..{domain.ranges[0][-1]}"]'
     return f"[{', '.join(map(str, domain))}]"
