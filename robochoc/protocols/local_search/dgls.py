@@ -47,7 +47,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 from robochoc.model.problem import INFINITE
 from robochoc.protocols import message as wire
-from robochoc.protocols.local_search.gdba import Breakout, Improve, pair
+from robochoc.protocols.local_search.gdba import Breakout, Improve, pair, summed
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.protocols.shared.cycles import CycleSettings, Then, Value
@@ -220,9 +220,8 @@ class DGLS(Breakout):
     def effective_costs(self) -> list[LexicographicCost]:
         """Return the effective cost of each of this robot's values, in thousandths."""
         self.functions = self._sums()
-        rows = [[(broken * UNIT, cost * UNIT) for broken, cost in map(pair, self.problem.charges)]]
-        rows += [self._effective(robots, function) for robots, function in self.functions.items()]
-        return [(sum(broken for broken, _ in row), sum(cost for _, cost in row)) for row in zip(*rows, strict=True)]
+        alone = [(broken * UNIT, cost * UNIT) for broken, cost in map(pair, self.problem.charges)]
+        return summed([alone, *(self._effective(robots, function) for robots, function in self.functions.items())])
 
     def _sums(self) -> dict[tuple[str, ...], Function]:
         """Return the functions whose other robots' values are known."""
@@ -231,7 +230,7 @@ class DGLS(Breakout):
             robots = self._robots[number]
             row = [pair(cost) for cost in costs]
             if robots in sums:
-                row = [(a + c, b + d) for (a, b), (c, d) in zip(sums[robots].costs, row, strict=True)]
+                row = summed([sums[robots].costs, row])
             sums[robots] = Function(tuple([self._last_values[name] for name in robots]), row, *self._ranges[robots])
         return sums
 

@@ -46,7 +46,7 @@ Choices that the paper leaves open, and differences:
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
 from robochoc.model.problem import INFINITE
@@ -171,8 +171,7 @@ class GDBA(Breakout):
     def effective_costs(self) -> list[LexicographicCost]:
         """Return the effective cost of each of this robot's values."""
         alone = [pair(cost) for cost in self.problem.charges]
-        rows = [alone, *(self._effective(one) for one in self.charged)]
-        return [(sum(broken for broken, _ in row), sum(cost for _, cost in row)) for row in zip(*rows, strict=True)]
+        return summed([alone, *(self._effective(one) for one in self.charged)])
 
     def _effective(self, charged: Charged) -> Sequence[LexicographicCost]:
         """Return the effective cost of each of this robot's values in one constraint."""
@@ -224,3 +223,8 @@ class GDBA(Breakout):
 def pair(cost: Cost) -> LexicographicCost:
     """Return a cost as a number of broken hard constraints and a finite cost."""
     return (1, 0) if cost == INFINITE else (0, cost)
+
+
+def summed(rows: Iterable[Sequence[LexicographicCost]]) -> list[LexicographicCost]:
+    """Return the sum of each column."""
+    return [(sum(broken for broken, _ in row), sum(cost for _, cost in row)) for row in zip(*rows, strict=True)]
