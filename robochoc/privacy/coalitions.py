@@ -20,7 +20,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections import deque
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -29,10 +29,13 @@ import msgspec
 from robochoc.communication.host import Host, order_of
 from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, ProblemKind, Relation, Robot, Semantics, Team
 from robochoc.privacy.errors import PrivacyError
+from robochoc.privacy.secrets import MOST_SECRETS
 from robochoc.protocols.message import Envelope
 from robochoc.protocols.protocol import Protocol
 from robochoc.sniffer.recorded_messages import types_by_name
 from robochoc.solver.agent_problem import AgentProblem, RunParameters, agent_problems
+from robochoc.solver.compiled_domain import compile_domain
+from robochoc.solver.compiled_team import CompiledTeam, CompileRobot
 from robochoc.solver.errors import TooLargeError
 from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.lazy_dataclass import dataclass
@@ -110,6 +113,7 @@ def coalition_report(
     parameters: RunParameters | None = None,
     coins: int = 1,
     costs: Sequence[float] = (),
+    compile_robot: CompileRobot = compile_domain,
 ) -> CoalitionReport:
     """Return the losses to each coalition of `size` robots in a run of `protocol`.
 
@@ -120,33 +124,40 @@ def coalition_report(
         parameters: The seed and the settings.
         coins: The number of seeds to try for the other robots' random numbers.
         costs: The possible costs of a secret entry; by default infinite, or an integer up to the largest in the team.
+        compile_robot: Compiles each robot with each table.
 
     Raises:
         PrivacyError: if the team is too large, or the protocol's messages cannot be compared.
+        Exception: the errors of `compile_robot`.
     """
     _check(team, protocol, size)
     given = parameters or RunParameters()
-    known_costs = tuple(costs) or _possible_costs(team)
     losses, exact = [], True
+    known_costs = tuple(costs)
+
+    def play(team: Team, members: Collection[str], coin: int) -> _Played:
+        return _play(CompiledTeam(team, compile_robot), protocol, given, members, coin)
+
     for members in itertools.combinations(team.order, size):
         secret = _secret_constraints(team, members)
         if not secret:
             continue
+        known_costs = known_costs or _possible_costs(team)
         number = _number_of_tables(secret, team, known_costs)
-        actual = _play(team, protocol, given, members, 0)
-        exact = exact and not actual.is_random
+        actual = play(team, members, 0)
         by_values = by_messages = 0
         for table in _tables(secret, team, known_costs):
             changed = _with_constraints(team, table)
             alike = seen = False
-            for coin in range(coins if actual.is_random else 1):
+            for coin in range(coins):
                 try:
-                    played = _play(changed, protocol, given, members, coin)
+                    played = play(changed, members, coin)
                 except TooLargeError:
                     continue
                 alike = alike or played.result == actual.result
                 seen = played.view == actual.view and played.result == actual.result
-                if seen:
+                exact = exact and not played.is_random
+                if seen or not played.is_random:
                     break
             by_values, by_messages = by_values + alike, by_messages + seen
         losses.append(CoalitionLoss(members, number, by_values, by_messages))
@@ -179,8 +190,18 @@ def _possible_costs(team: Team) -> tuple[float, ...]:
     """Return the possible costs of an entry, as in `robochoc/privacy/secrets.py`."""
     if team.kind == ProblemKind.DISCSP:
         return (0, INFINITE)
+    entries = _number_of_entries(team.constraints(), team)
+    if entries > MOST_SECRETS:
+        raise PrivacyError(f"the constraints have {entries:,} entries, more than {MOST_SECRETS:,}: use a smaller team")
     finite = [cost for one in team.constraints() for _, cost in _entries(one, team) if cost < INFINITE]
-    return (*range(int(max(finite, default=0)) + 1), INFINITE)
+    most = int(max(finite, default=0))
+    if most >= MOST_TABLES:
+        raise PrivacyError(f"an entry has {most + 2:,} possible costs, more than {MOST_TABLES:,}: use lower costs")
+    return (*range(most + 1), INFINITE)
+
+
+def _number_of_entries(constraints: Iterable[Constraint], team: Team) -> int:
+    return sum(math.prod(len(team.variables[name].domain) for name in one.variables) for one in constraints)
 
 
 def _entries(constraint: Constraint, team: Team) -> Iterator[tuple[tuple[int, ...], float]]:
@@ -203,7 +224,7 @@ def _secret_constraints(team: Team, members: Collection[str]) -> list[Constraint
 
 
 def _number_of_tables(secret: Sequence[Constraint], team: Team, costs: Sequence[float]) -> int:
-    entries = sum(math.prod(len(team.variables[name].domain) for name in one.variables) for one in secret)
+    entries = _number_of_entries(secret, team)
     if len(costs) ** entries > MOST_TABLES:
         raise PrivacyError(
             f"the other robots' constraints have {entries:,} secret entries of {len(costs)} possible costs, more than"
@@ -269,7 +290,9 @@ class _Drawn:
         protocol.chance, protocol.secret = draw, draw_secret
 
 
-def _play(team: Team, protocol: type[Protocol], given: RunParameters, members: Collection[str], coin: int) -> _Played:
+def _play(
+    team: CompiledTeam, protocol: type[Protocol], given: RunParameters, members: Collection[str], coin: int
+) -> _Played:
     """Run the protocol: messages are delivered one at a time, in the order in which they were sent."""
     traits = protocol.traits
     parts = agent_problems(team, given, shared_scopes=traits.shared_scopes, tree=traits.tree)

@@ -13,7 +13,7 @@ import msgspec
 from robochoc.communication.search_result import Progress
 from robochoc.journal.events import Decided, Received, Sent
 from robochoc.journal.journal import Journal
-from robochoc.journal.team_events import run_parameters_of
+from robochoc.journal.team_events import run_parameters_of, with_start
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ConstraintModel
 from robochoc.privacy.coalitions import CoalitionReport, coalition_report
@@ -31,6 +31,7 @@ from robochoc.run.defaults import CENTRAL
 from robochoc.run.registry import protocol_by_class
 from robochoc.sniffer.recorded_messages import message_of, types_by_name
 from robochoc.solver.agent_problem import RunParameters
+from robochoc.solver.compile import Compiler
 
 Edge = tuple[str, str]
 
@@ -80,13 +81,27 @@ def coalitions_of(
         coins: The number of seeds to try for the other robots' random numbers.
 
     Raises:
-        PrivacyError: if the run does not exist, required data are missing, or the team is too large.
+        PrivacyError: if the run does not exist, required data are missing, robots continue with results of an earlier
+            run, or the team is too large.
     """
     runs, number, robots = _rebuilt(journal, options, number)
-    given = runs[number - 1].given
-    parameters = RunParameters() if given is None else run_parameters_of(given)
-    team = robots.compiled.team
-    found = coalition_report(team, robots.protocol, size, parameters=parameters, coins=coins)
+    if robots.continuing:
+        raise PrivacyError(
+            f"in run {number}, robots continue with results of an earlier run, which cannot be repeated with other"
+            " tables: measure the first run (--run 1)"
+        )
+    run = runs[number - 1]
+    parameters = with_start(RunParameters() if run.given is None else run_parameters_of(run.given), run.began)
+    used = options or ReplayOptions()
+    with Compiler(used.limits, solver=used.solver) as compiler:
+        found = coalition_report(
+            robots.compiled.team,
+            robots.protocol,
+            size,
+            parameters=parameters,
+            coins=coins,
+            compile_robot=lambda robot: compiler.compile(robot).domain,
+        )
     return replace(found, protocol=_protocol_name(journal, robots))
 
 

@@ -26,9 +26,7 @@ MEASURES = ("linear", "entropy", "known")
 @click.command()
 @click.argument("journal", type=InputPath(), metavar="JOURNAL")
 @click.option("--run", "number", type=WholeNumber(1), metavar="N", help="Run or epoch N.  [default: the last]")
-@click.option(
-    "--measure", type=click.Choice(MEASURES), default="entropy", show_default=True, help="Measure shown in the table."
-)
+@click.option("--measure", type=click.Choice(MEASURES), help="Measure shown in the table.  [default: entropy]")
 @click.option(
     "--html", type=OutputFile(), metavar="FILE", help="Write a page with the loss of each robot to each other robot."
 )
@@ -49,7 +47,7 @@ MEASURES = ("linear", "entropy", "known")
 def privacy(
     journal: Path,
     number: int | None,
-    measure: str,
+    measure: str | None,
     html: Path | None,
     coalition: int | None,
     coins: int | None,
@@ -77,8 +75,9 @@ def privacy(
 
     if coalition is None and coins is not None:
         raise click.UsageError("--coins can be used with --coalition only")
-    if coalition is not None and html is not None:
-        raise click.UsageError("--html cannot be used with --coalition")
+    for option, given in (("--html", html), ("--measure", measure)):
+        if coalition is not None and given is not None:
+            raise click.UsageError(f"{option} cannot be used with --coalition")
     refuse_same_places({"--html": html}, {"the journal": journal})
     options = ReplayOptions(
         team=read_team(folder) if folder else None,
@@ -88,6 +87,7 @@ def privacy(
     if coalition is not None:
         _print_coalitions(journal, number, options, coalition, coins or 1, as_json=as_json)
         return
+    shown = Measure(measure or Measure.ENTROPY)
     report = _measured(journal, number, options)
     if as_json:
         from robochoc.cli.reports.privacy import privacy_json
@@ -96,9 +96,9 @@ def privacy(
     else:
         from robochoc.cli.reports.privacy import print_privacy
 
-        print_privacy(report, Measure(measure))
+        print_privacy(report, shown)
     if html is not None:
-        _write(html, report, Measure(measure))
+        _write(html, report, shown)
 
 
 def _print_coalitions(
@@ -110,6 +110,7 @@ def _print_coalitions(
     recorded = _unaltered(path)
     with _privacy_errors(path):
         report = coalitions_of(recorded, size, options, number, coins=coins)
+    _warn_of_unused_team(recorded, options)
     if as_json:
         click.echo(coalitions_json(report))
     else:
@@ -138,14 +139,19 @@ def _measured(path: Path, number: int | None, options: ReplayOptions) -> Privacy
     from robochoc.cli.reports.progress import progress_line
     from robochoc.formats import on_one_line
     from robochoc.privacy import privacy_of
-    from robochoc.replay.rebuild import reads_files
 
     recorded = _unaltered(path)
     with _privacy_errors(path), progress_line(on_one_line(recorded.header.team)) as progress:
         report = privacy_of(recorded, options, number, progress=progress)
+    _warn_of_unused_team(recorded, options)
+    return report
+
+
+def _warn_of_unused_team(recorded: Journal, options: ReplayOptions) -> None:
+    from robochoc.replay.rebuild import reads_files
+
     if options.team is not None and not reads_files(recorded.events):
         click.echo("--team is not used: the journal contains the robots' problems", err=True)
-    return report
 
 
 def _write(html: Path, report: PrivacyReport, measure: Measure) -> None:
