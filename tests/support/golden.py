@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Collection
 from dataclasses import replace
 from functools import cache
@@ -19,6 +20,7 @@ from robochoc.model.allocation import TasksModel
 from robochoc.model.problem import Constraint, ProblemKind, Relation, Semantics, Team
 from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
 from robochoc.run.registry import protocol_named, protocol_names
+from robochoc.system.blake2 import blake2b
 from tests.support.problems import team_of
 from tests.support.program import ROOT
 
@@ -44,6 +46,7 @@ MOST_TELLING = {
     "sfb": (("odd", ScheduleName.CONCURRENT), ("patrol", ScheduleName.RANDOM)),
 }
 """Runs that noticed more of 34 mutants of the protocol than those that `files` takes else."""
+_LONG = re.compile(rb'"([A-Za-z0-9+/=]{64,})"')
 
 
 def odd_team(*, n_ary: bool = True) -> Team:
@@ -90,7 +93,8 @@ def fixed_teams(protocol: str) -> dict[str, Team]:
 def journal(team: Team, protocol: str, schedule: ScheduleName) -> bytes:
     """The journal of the fixed run, of a few cycles or samples, in its text form; it was written and read as a file is.
 
-    The wall-clock time, which is not fixed, is left out, and so are the robots' files, which are no protocol's.
+    The wall-clock time, which is not fixed, is left out, and so are the robots' files, which are no protocol's. Long
+    strings of protocols with secret keys, mostly random bytes, are replaced by their digests.
     """
     withdraw = None if team.dynamic or team.kind is ProblemKind.DISWCSP else Withdrawal.MAXIMAL
     known = protocol_named(protocol).settings
@@ -107,7 +111,12 @@ def journal(team: Team, protocol: str, schedule: ScheduleName) -> bytes:
     )
     recorder = JournalRecorder(Header(team=team.name, protocol=protocol, runtime="simulator", seed=0))
     solve(team, options, observer=lambda event: None if isinstance(event, Given) else recorder(event))
-    return b"".join(lines_of(read_journal(recorder.content())))
+    lines = b"".join(lines_of(read_journal(recorder.content())))
+    return _LONG.sub(_digest, lines) if protocol_named(protocol).traits.secret_keys else lines
+
+
+def _digest(long: re.Match[bytes]) -> bytes:
+    return b'"%d characters, BLAKE2b %s"' % (len(long[1]), blake2b(long[1], digest_size=8).hexdigest().encode())
 
 
 @cache
