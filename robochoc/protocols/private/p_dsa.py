@@ -17,7 +17,8 @@ together. Nothing is opened until the end, when each robot receives its value in
   AIJ 161, 2005.
 
 Disclosed: the number of each robot's declared values, and the settings. Who shares a constraint with whom is not
-disclosed: each robot shares a table with each robot before it, also if all costs are 0.
+disclosed: each robot shares a table with each robot before it, also if all costs are 0. Two ends of a run disclose
+more: a robot without a possible value ends it, and a robot whose costs are too large for the field refuses it.
 
 Sizes: each cycle takes one comparison for each value of each robot, and one for the whole team; those that do not
 depend on each other are made at once.

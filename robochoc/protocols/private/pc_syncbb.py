@@ -24,6 +24,7 @@ Disclosed and hidden information:
 - Each robot discloses the number of its declared values, which the files declare. Impossible values are tried like
   others, at the cost of a broken constraint. Robots share costs with all robots before them, also if these are 0: so
   who shares a constraint with whom is not disclosed.
+- A refusal depends on private costs: they are too large for the field, or an open search needs too many comparisons.
 - A team of two robots has no minority: nothing is hidden in it.
 - A comparison is private up to 2^-bits: the random number that masks its inputs is 0 twice as often as any other.
 
@@ -62,11 +63,7 @@ from typing import Any, ClassVar
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.key_stream import shuffled
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.private.shared_arithmetic import (
-    Inputs,
-    Output,
-    SharedArithmeticMessage,
-)
+from robochoc.protocols.private.shared_arithmetic import Inputs, Output, SharedArithmeticMessage
 from robochoc.protocols.private.shared_costs import SharedCostsProtocol, Sizes, check_settings
 from robochoc.protocols.settings import Settings
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits

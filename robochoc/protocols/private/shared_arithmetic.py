@@ -16,7 +16,7 @@ import math
 from abc import abstractmethod
 from collections import deque
 from collections.abc import Callable, Collection, Sequence
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.disclosure import NOTHING, Proof, Reception
@@ -37,11 +37,15 @@ _MOST_PREPARED = 8
 
 
 class SharesMessage(Message, frozen=True):
-    """The base class of messages with shares, masked or opened values, as bytes."""
+    """The base class of messages with shares, masked or opened values, as bytes. `content` names them."""
 
     shares: bytes
 
     masked = frozenset({"shares"})
+    content: ClassVar[str]
+
+    def in_words(self, _: Wording) -> str:
+        return f"{self.content}: {len(self.shares):,} bytes"
 
     def proves(self, reception: Reception) -> Sequence[Proof] | None:
         """Prove nothing about single robots, unless there are only two: then one robot's shares are the secrets."""
@@ -52,36 +56,28 @@ class Randomness(SharesMessage, frozen=True):
     """The receiver's shares of random bits and numbers of the sender."""
 
     act = Act(Performative.INFORM, "the receiver has shares of random numbers")
-
-    def in_words(self, _: Wording) -> str:
-        return f"your shares of random numbers: {len(self.shares):,} bytes"
+    content = "your shares of random numbers"
 
 
 class Inputs(SharesMessage, frozen=True):
     """The receiver's shares of the sender's secrets."""
 
     act = Act(Performative.INFORM, "the receiver has shares of the sender's value and costs")
-
-    def in_words(self, _: Wording) -> str:
-        return f"your shares of my value and its costs: {len(self.shares):,} bytes"
+    content = "your shares of my value and its costs"
 
 
 class Masked(SharesMessage, frozen=True):
     """The sender's shares of masked values, for the first robot."""
 
     act = Act(Performative.REQUEST, "the receiver combines the shares, and publishes the masked values")
-
-    def in_words(self, _: Wording) -> str:
-        return f"my shares of masked values: {len(self.shares):,} bytes"
+    content = "my shares of masked values"
 
 
 class Opened(SharesMessage, frozen=True):
     """Masked values, combined from all shares."""
 
     act = Act(Performative.INFORM, "the receiver knows the masked values")
-
-    def in_words(self, _: Wording) -> str:
-        return f"the masked values are {self.shares[:4].hex()}... ({len(self.shares):,} bytes)"
+    content = "the masked values"
 
 
 class PublicResult(SharesMessage, frozen=True):
@@ -98,9 +94,7 @@ class Output(SharesMessage, frozen=True):
     """The sender's share of a result that only the receiver may know."""
 
     act = Act(Performative.INFORM, "the receiver can combine its result")
-
-    def in_words(self, _: Wording) -> str:
-        return "my share of your result"
+    content = "my share of your result"
 
 
 SharedArithmeticMessage = Randomness | Inputs | Masked | Opened | PublicResult | Output
