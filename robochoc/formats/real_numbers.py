@@ -18,13 +18,18 @@ from robochoc.model.cost_units import MAX_PLACES
 from robochoc.model.expression import Expression, Type
 from robochoc.model.expression.fixed_point import VALUE_PLACES, fixed_point
 from robochoc.model.problem import CostUnits, Domain, Function, Predicate
-from robochoc.model.real import DEFAULT_PLACES, MOST_PLACES, RealInterval, RealParameters, grid
+from robochoc.model.real import (
+    DEFAULT_PLACES,
+    DEFAULT_POINTS,
+    MOST_PLACES,
+    MOST_POINTS,
+    RealInterval,
+    RealParameters,
+    grid,
+)
 
 REAL_KINDS = ("real", "steps")
 """The types of real parameters: in the user's unit, or as the number of steps of the precision."""
-DEFAULT_POINTS = 9
-"""The number of points on the grid of a real domain."""
-MOST_POINTS = 1000
 
 _DECIMAL = r"[+-]?[0-9]{1,12}(?:\.[0-9]{1,9})?"
 _INTERVAL = re.compile(rf"\s*({_DECIMAL})\.\.({_DECIMAL})\s*(?::(.*))?", re.DOTALL)
@@ -64,7 +69,7 @@ def read_real_domain(element: etree._Element, places: int) -> Domain:
     else:
         points = int(given or DEFAULT_POINTS)
         if not 1 < points <= MOST_POINTS:
-            raise MistakeError(f"a grid of {points} points", f"use 2 to {MOST_POINTS} points")
+            raise MistakeError(f"points is {points}", f"use 2 to {MOST_POINTS} points")
         ranges = grid(low, high, points)
     domain = Domain(name, ranges, real=real)
     check_domain(domain)

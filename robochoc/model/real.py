@@ -7,14 +7,22 @@ the values that robots can choose. `run/refinement.py` replaces grids by finer o
 from __future__ import annotations
 
 from dataclasses import field
+from typing import TYPE_CHECKING
 
 from robochoc.model.expression import Expression
 from robochoc.system.lazy_dataclass import dataclass
+
+if TYPE_CHECKING:
+    from fractions import Fraction
 
 DEFAULT_PLACES = 3
 """The decimal places of real numbers, unless a file specifies its precision."""
 MOST_PLACES = 6
 """The maximum number of decimal places of real numbers."""
+DEFAULT_POINTS = 9
+"""The number of points on the grid of a real domain."""
+MOST_POINTS = 1000
+"""The maximum number of points on the grid of a real domain, unless they are listed."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +43,13 @@ class RealInterval:
         """Return a number of steps in the user's unit."""
         scale: int = 10**self.places
         return steps / scale
+
+    def steps(self, number: float | Fraction) -> int | None:
+        """Return a finite number in steps. None: it is outside the interval, or not a multiple of the precision."""
+        from fractions import Fraction  # noqa: PLC0415 - start-up: rarely needed
+
+        exact = Fraction(str(number)) * 10**self.places
+        return int(exact) if exact.denominator == 1 and self.low <= exact <= self.high else None
 
 
 @dataclass(frozen=True)

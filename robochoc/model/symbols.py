@@ -28,6 +28,22 @@ def real_places(team: Team) -> dict[str, int]:
     return {one.name: one.domain.real.places for one in _all_variables(team) if one.domain.real}
 
 
+def on_grids(team: Team) -> Team:
+    """Return `team` on its present grids: an ordinary problem, with numbers of steps instead of real numbers."""
+
+    def counted(constraint: Constraint) -> Constraint:
+        definition = constraint.definition
+        if isinstance(definition, Relation) or definition.real is None:
+            return constraint
+        return replace(constraint, definition=replace(definition, real=None))
+
+    def on_grid(robot: Robot) -> Robot:
+        variables = tuple(replace(one, domain=replace(one.domain, real=None)) for one in robot.variables)
+        return replace(robot.with_constraints(counted), variables=variables)
+
+    return replace(team, robots=tuple(map(on_grid, team.robots)))
+
+
 def _all_variables(team: Team) -> Iterator[Variable]:
     for robot in team.robots:
         yield from robot.variables

@@ -21,8 +21,9 @@ from robochoc.formats.diagnostics import MistakeError
 from robochoc.formats.names import BEYOND
 from robochoc.formats.symbols import check_symbol
 from robochoc.model.constraint import merge_ranges
+from robochoc.model.real import MOST_PLACES, MOST_POINTS, RealInterval, grid
 from robochoc.modelling.errors import ModelError, ModelTypeError, SourceLine
-from robochoc.modelling.numbers import exact, is_number, is_truth
+from robochoc.modelling.numbers import exact, is_number, is_truth, whole_number
 from robochoc.system.lazy_dataclass import dataclass
 
 MAX_VALUES = 100_000
@@ -64,6 +65,7 @@ class DomainCodes:
         scale: For numbers: code = value * scale.
         user_values: The user's values by code. None: the codes are the values.
         later: The codes of the values that events add.
+        real: The interval of real numbers. The codes are then numbers of steps of its precision, and `ranges` a grid.
     """
 
     kind: ValueKind
@@ -71,6 +73,7 @@ class DomainCodes:
     scale: int = 1
     user_values: Mapping[int, Hashable] | None = None
     later: tuple[int, ...] = ()
+    real: RealInterval | None = None
 
     def __len__(self) -> int:
         return sum(map(len, self.ranges))
@@ -86,6 +89,8 @@ class DomainCodes:
 
     def value(self, code: int) -> object:
         """Return the user's value for a code."""
+        if self.real:
+            return self.real.number(code)
         return code if self.user_values is None else self.user_values.get(code, code)
 
     @property
@@ -95,7 +100,9 @@ class DomainCodes:
 
     @property
     def ends(self) -> tuple[int, int]:
-        """The least and the greatest code in `ever`."""
+        """The least and the greatest code in `ever`, or of any real number in the interval."""
+        if self.real:
+            return self.real.low, self.real.high
         return min([self.ranges[0][0], *self.later]), max([self.ranges[-1][-1], *self.later])
 
     def code(self, value: object) -> int | None:
@@ -104,6 +111,8 @@ class DomainCodes:
             return self._by_value.get(value)
         if not is_number(value):
             return None
+        if self.real:
+            return self.real.steps(exact(value))
         scaled = exact(value) * self.scale
         known = scaled == int(scaled) and (scaled in self.later or any(int(scaled) in part for part in self.ranges))
         return int(scaled) if known else None
@@ -197,6 +206,27 @@ def codes_of(domain: object, symbols: Symbols, place: SourceLine) -> DomainCodes
             hint = "use immutable values, such as tuples"
             raise ModelTypeError(f"the value {value!r} of a domain is not hashable", hint, place) from None
     return _listed(values, symbols, place)
+
+
+def real_codes(low: object, high: object, precision: object, points: object, place: SourceLine) -> DomainCodes:
+    """Return the codes of an interval of real numbers. See `ModelRobot.real`. Raises `ModelError`."""
+    step = exact(precision)
+    places = next((places for places in range(MOST_PLACES + 1) if step * 10**places == 1), None)
+    if places is None:
+        hint = f"expected a power of ten of at most {MOST_PLACES} places: 1, 0.1, 0.01, ..."
+        raise ModelError(f"invalid precision {precision!r}", hint, place)
+    ends = [exact(end) * 10**places for end in (low, high)]
+    for end, steps in zip((low, high), ends, strict=True):
+        if int(steps) != steps or abs(steps) >= BEYOND:
+            hint = f"use a multiple of {precision}, or another precision"
+            raise ModelError(f"{end!r} is not a number of at most 18 digits with the precision", hint, place)
+    least, most = map(int, ends)
+    if least >= most:
+        raise ModelError(f"the interval from {low!r} to {high!r} is empty", "write the smaller number first", place)
+    number = whole_number(points)
+    if number is None or not 1 < number <= MOST_POINTS:
+        raise ModelError(f"invalid points={points!r}", f"a grid has 2 to {MOST_POINTS} points", place)
+    return DomainCodes(NUMBER, grid(least, most, number), 10**places, real=RealInterval(least, most, places))
 
 
 def _listed(values: list[Hashable], symbols: Symbols, place: SourceLine) -> DomainCodes:

@@ -21,13 +21,16 @@ from robochoc.model.constraint import (
     WhenAbsent,
 )
 from robochoc.model.constraint import Term as Actual
-from robochoc.model.expression import Apply, Constant, Expression, Name
+from robochoc.model.expression import Apply, Constant, Expression, ExpressionError, Name, Type
+from robochoc.model.expression.fixed_point import VALUE_PLACES, fixed_point
 from robochoc.model.magnitudes import MAX_COST
+from robochoc.model.real import RealParameters
 from robochoc.modelling.errors import ModelError, SourceLine
 from robochoc.modelling.numbers import Exact, exact, is_infinite, places_of, rounded, shown
+from robochoc.modelling.real_terms import RealTranslator
 from robochoc.modelling.tables import Price, Row, commonest, in_short, listed_rows, prices, truths
 from robochoc.modelling.terms import Linear, ModelVariable, Operation, TableTerm, Term
-from robochoc.modelling.translation import Translator, UntranslatableError, may_be_undefined
+from robochoc.modelling.translation import Scaled, Translator, UntranslatableError, may_be_undefined
 from robochoc.system.lazy_dataclass import dataclass
 
 _FALSE: Expression = Apply("ne", (Constant(0), Constant(0)))
@@ -41,7 +44,8 @@ class Draft:
         name: The constraint's name.
         scope: The constraint's variables. Empty: its truth or cost is constant (`model/assembly.py`).
         place: The line that created it.
-        body: The expression for a condition or a cost, in which `X0`, `X1`, ... are the variables.
+        body: The expression for a condition or a cost, in which `X0`, `X1`, ... are the variables. Over real variables,
+            it has decimals (`modelling/real_terms.py`).
         rows: The rows, if the constraint is a table.
         semantics: The meaning of the rows. None: `body` is a condition or a cost.
         is_cost: True if the value of `body` is a cost.
@@ -70,9 +74,8 @@ class Draft:
         """Return this draft with `when_absent` set. Raises `ModelError` if the constraint cannot be restated."""
         if when_absent == WhenAbsent.RESTATE:
             names = tuple(variable.name for variable in self.scope)
-            formals = tuple(f"X{number}" for number in range(len(names)))
-            body = None if self.body is None else Predicate("", formals, self.body)
-            if body is None or not can_be_restated(Constraint(self.name, body, names, names)):
+            definition = None if self.body is None else _definition(self, self.body)
+            if definition is None or not can_be_restated(Constraint(self.name, definition, names, names)):
                 hint = (
                     "use a sum, count, all_of, any_of, minimum or maximum of terms of one form, compared with a number"
                 )
@@ -87,6 +90,8 @@ class Draft:
     @property
     def places(self) -> int:
         """The number of decimal places of the costs. Raises `ModelError` if there are too many."""
+        if self.is_cost and any(variable.codes.real for variable in self.scope):
+            return VALUE_PLACES
         found = [one for one in {*self.rows.values(), self.default, self.cost or 0} if not isinstance(one, float)]
         return max(places_of(one, self.place) for one in found) if self.soft else 0
 
@@ -171,13 +176,11 @@ def _sum(group: Sequence[ObjectiveTerm], name: str) -> Draft:
         if isinstance(table, TableTerm) and (rows := listed_rows(table)) is not None:
             priced = {row: _scaled(value, factor, places) for row, value in rows.items()}
             return _table(name, scope, place, priced, _scaled(table.default, factor, places))
-    try:
-        scaled = Translator(_formals(scope)).whole_number(whole)
-    except UntranslatableError:
-        scaled = None
+    scaled = _number(whole, scope)
     if scaled is not None and scaled.divisor == 1:
         return Draft(name, scope, place, scaled.expression, is_cost=True)
-    found = {row: _scaled(price, 1, places) for row, price in prices(parts, scope, place).items()}
+    by_form = sorted(parts, key=lambda part: _number(part[1], scope) is not None)  # errors show the first term
+    found = {row: _scaled(price, 1, places) for row, price in prices(by_form, scope, place).items()}
     _check_digits(found, whole, place)
     return _table(name, scope, place, found, commonest(found))
 
@@ -240,13 +243,46 @@ def _first_row(scope: Sequence[ModelVariable]) -> Row:
 
 def _body(term: Term) -> Expression | None:
     try:
-        return Translator(_formals(term.variables)).whole_condition(term)
+        return _translator(term.variables).whole_condition(term)
     except UntranslatableError:
         return None
 
 
-def _formals(scope: Sequence[ModelVariable]) -> dict[ModelVariable, str]:
-    return {variable: f"X{number}" for number, variable in enumerate(scope)}
+def _number(term: Term, scope: Sequence[ModelVariable]) -> Scaled | None:
+    try:
+        return _translator(scope).whole_number(term)
+    except UntranslatableError:
+        return None
+
+
+def _translator(scope: Sequence[ModelVariable]) -> Translator:
+    formals = {variable: f"X{number}" for number, variable in enumerate(scope)}
+    return RealTranslator(formals) if any(variable.codes.real for variable in scope) else Translator(formals)
+
+
+def _definition(draft: Draft, body: Expression) -> Predicate | Function:
+    """Return the definition of a condition or cost with this body. Raises `ModelError`."""
+    formals = tuple(f"X{number}" for number in range(len(draft.scope)))
+    real, places = _real_parameters(draft, formals, body), 0
+    if real:
+        places = VALUE_PLACES if draft.is_cost else 0
+        wanted = Type.INTEGER if draft.is_cost else Type.BOOLEAN
+        try:
+            body = fixed_point(body, real.names, real.places, wanted, places)
+        except ExpressionError as error:
+            raise ModelError(f"{draft.name}: {error.message}", error.hint, draft.place) from None
+    if draft.is_cost:
+        return Function("", formals, body, real=real, places=places)
+    return Predicate("", formals, body, real=real)
+
+
+def _real_parameters(draft: Draft, formals: Sequence[str], source: Expression) -> RealParameters | None:
+    real = {name: one.codes.real for name, one in zip(formals, draft.scope, strict=True) if one.codes.real}
+    precisions = {one.places for one in real.values()}
+    if len(precisions) > 1:
+        message = f"{draft.name} is over real variables of different precisions"
+        raise ModelError(message, "use the same precision for all real variables", draft.place)
+    return RealParameters(tuple(real), precisions.pop(), source) if real else None
 
 
 class Definitions:
@@ -275,16 +311,16 @@ class Definitions:
         if draft.body is None:
             relation = self._named("R", _relation(draft, unit, sign))
             return Constraint(draft.name, relation, names, names)
-        formals = tuple(f"X{number}" for number in range(len(names)))
+        definition = _definition(draft, draft.body)
         if draft.is_cost:
-            return Constraint(draft.name, self._named("F", Function("", formals, draft.body)), names, names)
+            return Constraint(draft.name, self._named("F", definition), names, names)
         cost = INFINITE if draft.cost is None else int(draft.cost * unit) * sign
-        actual = _predefined(draft.body, dict(zip(formals, names, strict=True)))
-        names_symbol = any(variable.codes.symbolic for variable in draft.scope) and len(names) == 1
-        if actual and not names_symbol:  # the terms of a scope cannot be symbols
-            predicate, terms = actual
+        actual = _predefined(draft.body, dict(zip(definition.parameters, names, strict=True)))
+        kinds = {(variable.codes.symbolic, variable.codes.real is not None) for variable in draft.scope}
+        if actual and (kinds == {(False, False)} or (len(kinds) == 1 and len(names) > 1)):
+            predicate, terms = actual  # the terms of a scope cannot be symbols or real numbers
             return Constraint(draft.name, predicate, terms, terms, cost=cost)
-        own = self._named("P", Predicate("", formals, draft.body))
+        own = self._named("P", definition)
         return Constraint(draft.name, own, names, names, cost=cost)
 
     def _named(self, letter: str, definition: Definition) -> Definition:
@@ -300,9 +336,7 @@ def _called(definition: Definition, name: str) -> Definition:
     match definition:
         case Relation(arity=arity, semantics=semantics, tuples=tuples, costs=costs, default_cost=default):
             return Relation(name, arity, semantics, tuples, costs, default)
-        case Predicate(parameters=parameters, body=body):
-            return Predicate(name, parameters, body)
-        case Function():
+        case Predicate() | Function():
             return replace(definition, name=name)
 
 

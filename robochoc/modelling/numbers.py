@@ -77,7 +77,7 @@ def places_of(value: Exact, place: SourceLine | None = None) -> int:
     Raises:
         ModelError: if the cost has more than nine places.
     """
-    places = _places(value)
+    places = decimal_places(value)
     if places is not None:
         return places
     hint = "round all costs by minimize(..., places=3) or maximize(..., places=3), or one cost by round(cost, 3)"
@@ -100,11 +100,11 @@ def rounded(value: Exact, places: int | None) -> Exact:
 
 def shown(value: Exact) -> str:
     """Return a number as text: as a decimal if it has few enough places for a cost, otherwise as a fraction."""
-    places = _places(value)
+    places = decimal_places(value)
     return str(value) if places is None else f"{Decimal(int(value * 10**places)).scaleb(-places):f}"
 
 
-def _places(value: Exact) -> int | None:
+def decimal_places(value: Exact) -> int | None:
     """Return the number of decimal places, or None if there are too many for a cost."""
     denominator = Fraction(value).denominator
     return next((places for places in range(MAX_PLACES + 1) if 10**places % denominator == 0), None)

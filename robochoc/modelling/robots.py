@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Never
 from robochoc.formats.names import MAX_NAME, MAX_WEIGHT, RESERVED, is_name
 from robochoc.model.expression import Expression
 from robochoc.model.problem import Topic
-from robochoc.modelling.codes import codes_of
+from robochoc.model.real import DEFAULT_POINTS
+from robochoc.modelling.codes import DomainCodes, codes_of, real_codes
 from robochoc.modelling.constraints import ModelConstraint
 from robochoc.modelling.errors import ModelError, ModelTypeError, SourceLine, UnknownNameError, calling_line
 from robochoc.modelling.numbers import whole_number
@@ -116,13 +117,48 @@ class ModelRobot:
             if len(rest) == 1 and (high := whole_number(rest[0])) is not None and whole_number(domain) is not None:
                 hint = f"write range({domain}, {high + 1}) for the values from {domain} to {high}"
             raise ModelTypeError(f"variable() takes one domain, not {', '.join(map(repr, (domain, *rest)))}", hint)
+        return self._created(name, codes_of(domain, self._model.symbols, place), place, qualified=qualified)
+
+    def real(
+        self,
+        name: str,
+        low: object,
+        high: object,
+        *,
+        precision: object = 0.001,
+        points: int = DEFAULT_POINTS,
+        qualified: bool = True,
+    ) -> ModelVariable:
+        """Add a variable whose value is a real number: a multiple of the precision in an interval.
+
+        Constraints and costs over it are expressions of `+ - * / // % **`, `abs`, `minimum`, `maximum`, `if_then_else`
+        and comparisons. Costs are truncated to six decimal places. See the guide "Real numbers".
+
+        Args:
+            name: The variable's name. In the team, the variable is called ROBOT.NAME.
+            low: The lower end of the interval, in the user's unit.
+            high: The upper end.
+            precision: The smallest step: 1, 0.1, ..., 0.000001. All real variables of a model have the same precision.
+            points: The number of points of the first grid, from 2 to 1000.
+            qualified: See `variable`.
+
+        Returns:
+            The variable. Its value in a solution is a float.
+
+        Raises:
+            ModelError: if the robot has a variable with this name, or an argument is invalid.
+        """
+        place = calling_line()
+        return self._created(name, real_codes(low, high, precision, points, place), place, qualified=qualified)
+
+    def _created(self, name: str, codes: DomainCodes, place: SourceLine, *, qualified: bool) -> ModelVariable:
+        """Return a new variable, which is added to the robot. Raises `ModelError` if its name is invalid or taken."""
         whole = f"{self.name}.{name}" if qualified else name
         if not is_name(whole) or len(whole) > MAX_NAME:
             raise ModelError(f"invalid variable name {name!r}", "a letter, then letters, digits, '.' and '_'")
         if name in self.variables or whole in self._model.variables:
             there = self._model.variables[whole] if whole in self._model.variables else self.variables[name]
             raise ModelError(f"variable {there!r} exists already, created at {there.place}", "use another name")
-        codes = codes_of(domain, self._model.symbols, place)
         made = ModelVariable(whole, codes, self.name, place, self.joins)
         self.add_variable(name, made)
         return made
@@ -189,6 +225,8 @@ class ModelRobot:
         term = number(value)
         if foreign := [one for one in term.variables if one.owner != self.name]:
             raise ModelError(f"{foreign[0]!r} is not a variable of {self.name}", "use this robot's variables")
+        if any(one.codes.real for one in term.variables):
+            raise ModelError(f"the position {term!r} is a real number", "write the topic into the robot's saved file")
         try:
             scaled = Translator({one: one.name for one in term.variables}).number(term)
         except UntranslatableError:

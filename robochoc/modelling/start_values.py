@@ -67,8 +67,8 @@ def start_values(
 def _code(team: Team, name: str, value: object, variables: Mapping[str, ModelVariable]) -> int | None:
     """Return the integer for a user's value of the variable `name`; None if it is not possible."""
     if name in variables:
-        code = variables[name].codes.code(value)
-        return code if code is not None and code in team.variables[name].domain else None
+        code, domain = variables[name].codes.code(value), team.variables[name].domain
+        return code if code is not None and (domain.real or code in domain) else None
     whole = whole_number(value)
     return code_of(value if whole is None else whole, team.variables[name].domain)
 
@@ -76,5 +76,8 @@ def _code(team: Team, name: str, value: object, variables: Mapping[str, ModelVar
 def _possible(team: Team, name: str, variables: Mapping[str, ModelVariable]) -> str:
     """Return the values of the variable `name` in words."""
     domain = team.variables[name].domain
+    if domain.real:
+        low, high = map(domain.label, (domain.real.low, domain.real.high))
+        return f"its values are the multiples of {10**-domain.real.places} from {low} to {high}"
     values = [variables[name].codes.value(one) if name in variables else domain.label(one) for one in domain]
     return f"its values are {listed([repr(one) for one in values]) or 'none'}"

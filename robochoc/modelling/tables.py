@@ -47,9 +47,11 @@ def prices(parts: Sequence[tuple[Exact, Term]], scope: Sequence[ModelVariable], 
 
 
 def listed_rows(term: TableTerm) -> dict[Row, object] | None:
-    """Return a table over distinct variables with its rows as codes. None: the table is over other terms."""
+    """Return a table over distinct variables with its rows as codes. None: its arguments are other terms, or real."""
     variables = [one for one in term.arguments if isinstance(one, ModelVariable)]
     if len(term.variables) < len(term.arguments) or len(variables) < len(term.arguments):
+        return None
+    if any(variable.codes.real for variable in variables):
         return None
     found = {}
     for row, value in term.rows.items():
@@ -67,6 +69,10 @@ def commonest(found: Mapping[Row, Price]) -> Price:
 def _combinations(
     scope: Sequence[ModelVariable], place: SourceLine, term: Term
 ) -> Iterator[tuple[Row, dict[ModelVariable, object]]]:
+    real = next((one for one in scope if one.codes.real), None)
+    if real is not None:
+        hint = "use + - * / ** abs, minimum, maximum, if_then_else and comparisons"
+        raise ModelError(f"{in_short(term)} can be expressed only as a table, and {real!r} is real", hint, place)
     size = math.prod(len(variable.codes.ever) for variable in scope)
     if size > MAX_COMBINATIONS:
         raise ModelError(

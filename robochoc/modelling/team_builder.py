@@ -24,6 +24,7 @@ from robochoc.model.problem import (
     ScenarioEvent,
     Team,
 )
+from robochoc.model.real import RealInterval
 from robochoc.model.symbols import symbol_table, with_marked_symbols, with_table_everywhere
 from robochoc.modelling.constraints import ModelConstraint
 from robochoc.modelling.drafts import Definitions, Draft, costs_of
@@ -99,7 +100,7 @@ class _Builder:
         total = int(constant * 10**places) + known.constant * self._finer
         self._units = CostUnits(bool(model.maximized), places, total)
         self._definitions = Definitions(given.definitions if given else ())
-        self._domains: dict[tuple[tuple[range, ...], tuple[str, ...]], str] = {}
+        self._domains: dict[tuple[tuple[range, ...], tuple[str, ...], RealInterval | None], str] = {}
         self._symbols = model.symbols.all
         self._places: dict[str, SourceLine] = {}
 
@@ -170,9 +171,9 @@ class _Builder:
         found = []
         for variable in robot.variables.values():
             symbols = self._symbols if variable.codes.symbolic else ()
-            key = variable.codes.ranges, symbols
+            key = variable.codes.ranges, symbols, variable.codes.real
             name = variable.domain_name or self._domains.setdefault(key, f"D{len(self._domains) + 1}")
-            found.append(Variable(variable.name, Domain(name, variable.codes.ranges, symbols)))
+            found.append(Variable(variable.name, Domain(name, *key)))
         return found
 
     def _scenario(self, team: Team) -> tuple[ScenarioEvent, ...]:

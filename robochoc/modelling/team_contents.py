@@ -80,7 +80,7 @@ def model_variable(variable: Variable, owner: str, symbols: Symbols, place: Sour
     domain = variable.domain
     for symbol in domain.symbols:
         symbols.code(symbol)
-    codes = DomainCodes(NUMBER, domain.ranges)
+    codes = DomainCodes(NUMBER, domain.ranges, 10**domain.real.places if domain.real else 1, real=domain.real)
     if domain.symbols:
         codes = DomainCodes(kind_of(""), domain.ranges, user_values={value: domain.symbols[value] for value in domain})
     made = ModelVariable(variable.name, codes, owner, place)

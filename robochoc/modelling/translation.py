@@ -59,7 +59,7 @@ class Translator:
         Raises:
             UntranslatableError: if the term must become a table, whose entries have no such limit.
         """
-        _check_size(expression)
+        check_size(expression)
         if self._combinations <= MAX_COMBINATIONS and excess(expression, self._limits):
             raise UntranslatableError
         return expression
@@ -216,7 +216,7 @@ def _times(factor: int, expression: Expression) -> Expression:
             return Apply("mul", (Constant(factor), expression))
 
 
-def _check_size(expression: Expression) -> None:
+def check_size(expression: Expression) -> None:
     """Raise `UntranslatableError` if `expression` is too large for a file. Shared subexpressions are visited once."""
     known: dict[int, tuple[int, int]] = {}
 

@@ -9,6 +9,7 @@ from decimal import Decimal
 from robochoc.model.cost_units import Cost
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ProblemKind, Team
+from robochoc.model.symbols import on_grids, real_places
 from robochoc.run.defaults import AUTO, CENTRAL
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
@@ -50,7 +51,7 @@ class Optimum:
 
 
 def certified_optimum(team: Team, protocol: str = CENTRAL, timeout_s: float = TIMEOUT_S) -> Optimum:
-    """Return the best cost of `team`.
+    """Return the best cost of `team`. Real variables have the values on the grids of the files.
 
     Args:
         team: The team.
@@ -64,6 +65,7 @@ def certified_optimum(team: Team, protocol: str = CENTRAL, timeout_s: float = TI
     if protocol not in {AUTO, CENTRAL} and not protocol_named(protocol).traits.complete:
         raise UnsupportedError(f"{protocol} is incomplete and cannot prove an optimum: choose a complete protocol")
     runtime = Runtime.PROCESSES if protocol == CENTRAL else Runtime.SIMULATOR
+    team = on_grids(team) if real_places(team) else team
     outcome = solve(team, Options(protocol=protocol, runtime=runtime, timeout=timeout_s))
     proven = Verdict.SOLUTION if team.kind == ProblemKind.DISCSP else Verdict.OPTIMAL
     if outcome.verdict != proven:

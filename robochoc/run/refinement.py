@@ -109,7 +109,8 @@ def solve_on_grids(team: Team, options: Options, solve_grid: SolveGrid) -> Outco
             break
         grids, team_now = finer, _on_grids(team, finer)
         options = _next_options(options, best, outcome)
-    return _certified(team, replace(best, grids=tuple(history)))
+    is_late = options.limit_s is not None and time.monotonic() - began >= options.limit_s
+    return _certified(team, replace(best, grids=tuple(history)), is_late=is_late)
 
 
 def _first_grid(real: RealInterval, domain: Domain, dimensions: int) -> _Grid:
@@ -199,16 +200,19 @@ def _better(team: Team, best: Outcome, new: Outcome) -> Outcome:
     return replace(min(new, best, key=rank), metrics=best.metrics + new.metrics)
 
 
-def _certified(team: Team, best: Outcome) -> Outcome:
-    """Return an outcome whose verdict and bound hold for all values, not only for those on grids."""
+def _certified(team: Team, best: Outcome, *, is_late: bool) -> Outcome:
+    """Return an outcome whose verdict and bound hold for all values, not only for those on grids.
+
+    If the run `is_late`, the bound is that of the whole intervals, without branching.
+    """
     best = replace(best, bound=None, count=None, optima=None, confirmed=False, confirmed_by=())
     if best.verdict == Verdict.OPTIMAL:
         best = replace(best, verdict=Verdict.SOLUTION)
     if best.withdrawn or best.lost or (best.assignment and team.kind == ProblemKind.DISCSP):
         return best
-    from robochoc.verification.real_bound import certificate  # noqa: PLC0415 - start-up: few teams need it
+    from robochoc.verification.real_bound import EVALUATIONS, certificate  # noqa: PLC0415 - start-up: few teams need it
 
-    proof = certificate(team, best.assignment)
+    proof = certificate(team, best.assignment, 0 if is_late else EVALUATIONS)
     if proof.is_infeasible:
         return replace(best, verdict=Verdict.NO_SOLUTION, verified=True, witness=None, reason=_INFEASIBLE)
     if best.verdict == Verdict.NO_SOLUTION:

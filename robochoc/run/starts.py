@@ -7,6 +7,7 @@ none, the start assignment is optimal (`run/evaluation.py`).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import NamedTuple
@@ -77,7 +78,12 @@ def start_of_outcome(outcome: Outcome, team: Team, names: Mapping[str, str] = Ma
 
 
 def code_of(value: object, domain: Domain) -> int | None:
-    """Return the integer for a number, or the name of a symbol, in `domain`; None if `domain` does not contain it."""
+    """Return the integer for a number, or the name of a symbol, in `domain`; None if `domain` does not contain it.
+
+    A real number may be anywhere in the interval of `domain`.
+    """
+    if domain.real:
+        return domain.real.steps(value) if isinstance(value, int | float) and math.isfinite(value) else None
     if domain.symbols:
         value = domain.symbols.index(value) if value in domain.symbols else None
     return value if isinstance(value, int) and value in domain else None

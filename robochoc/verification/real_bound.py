@@ -26,7 +26,7 @@ EVALUATIONS = 40_000
 """The default maximum number of evaluations of a cost over a box."""
 
 _TANGENTS = 60
-"""The number of tangents of convex costs."""
+"""The maximum number of tangents of convex costs."""
 _FINENESS = 1024
 
 _Box = dict[str, Interval]
@@ -109,7 +109,8 @@ def _bound(problem: _Problem, best: Assignment, evaluations: int) -> int | None:
     first = _opened(problem, problem.box, best, next(count))
     if first is None:
         return None
-    first = first._replace(bound=max(first.bound, _convex_bound(problem, best)))
+    tangents = max(1, min(_TANGENTS, evaluations // max(1, len(problem.costs))))
+    first = first._replace(bound=max(first.bound, _convex_bound(problem, best, tangents)))
     waiting, closed = [first], [] if known is None else [known]
     while waiting and evaluations > 0 and (known is None or waiting[0].bound < known):
         one = heapq.heappop(waiting)
@@ -161,8 +162,8 @@ def _opened(problem: _Problem, box: _Box, best: Assignment, number: int) -> _Ope
     return _Open(math.floor(max(intervals, means, tangents)), number, left, slopes)
 
 
-def _convex_bound(problem: _Problem, best: Assignment) -> int:
-    """Return the best bound by tangents at points on the way to the minimum, if all costs are convex.
+def _convex_bound(problem: _Problem, best: Assignment, tangents: int) -> int:
+    """Return the best bound by this number of tangents at points on the way to the minimum, if all costs are convex.
 
     The way follows gradients with the steps of Barzilai and Borwein (IMA Journal of Numerical Analysis 8, 1988). The
     tangents are exact, so that each of them is a bound wherever the way leads.
@@ -170,7 +171,7 @@ def _convex_bound(problem: _Problem, best: Assignment) -> int:
     point: dict[str, Number] = {name: _nearest(best.get(name), part) for name, part in problem.box.items()}
     bounds_found = [_lowest(problem)]
     before: tuple[dict[str, Number], dict[str, Number]] | None = None
-    for _ in range(_TANGENTS):
+    for _ in range(tangents):
         bound, gradient = Fraction(problem.least), dict[str, Number]()
         for cost in problem.costs:
             model = local_model(cost.body, problem.box, point)
@@ -319,11 +320,11 @@ def _with_constraint(problem: _Problem, constraint: Constraint, unit: int, place
 
 def _divisor(constraint: Constraint) -> int:
     """Return the constant by which the value of a function is divided at last; 1 if there is none."""
-    match constraint.definition, constraint.applied:
-        case Function(), Apply("div", (_, Constant(divisor))) if divisor > 0:
-            return divisor
-        case _:
-            return 1
+    if isinstance(constraint.definition, Function):
+        match constraint.applied:
+            case Apply("div", (_, Constant(divisor))) if divisor > 0:
+                return divisor
+    return 1
 
 
 _ZERO = Interval(0, 0)

@@ -333,10 +333,11 @@ def _tokens(text: str, pattern: re.Pattern[str]) -> list[_Token]:
             sign = _SIGN.match(text, position)
             if sign:
                 raise ExpressionError(f"unknown sign '{sign[0]}'", position, _call_hint(_SIGNS[sign[0]]))
+            numbers = "integers" if pattern is _TOKEN else "decimals such as 0.5"
             raise ExpressionError(
                 f"unexpected character {match[2]!r}",
                 position,
-                "expressions are made of names, integers and ( ) , + - *",
+                f"expressions are made of names, {numbers} and ( ) , + - *",
             )
         tokens.append(_Token(match[1], match.start(1)))
     return [*tokens, _Token("", len(text))]

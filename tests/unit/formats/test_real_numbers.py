@@ -118,7 +118,7 @@ def test_a_scenario_removes_points(tmp_path: Path) -> None:
     ("0..10</domain>", "0..0.0001</domain>", "A.xml:3: 0.0001 has more decimal places than the precision 0.001"),
     ("0..10</domain>", "0 5</domain>", "A.xml:3: '0 5' is not an interval of real numbers"),
     ("0..10</domain>", "0..10: 3 11</domain>", "A.xml:3: the value 11.0 of domain D is outside its interval"),
-    ('type="real">', 'type="real" points="1">', "A.xml:3: a grid of 1 points"),
+    ('type="real">', 'type="real" points="1">', "A.xml:3: points is 1"),
     ('type="real">', 'type="integer" points="3">', "A.xml:3: only a real domain has points"),
     ('"DisWCSP"', '"DisWCSP" precision="0.02"', "A.xml:2: invalid precision '0.02'"),
     ('"DisWCSP"', '"DisWCSP" scale="0.01"', "has 6 decimal places, costs 2"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from itertools import pairwise
 from pathlib import Path
 
@@ -34,6 +35,14 @@ def test_baselines_lie_between_random_and_optimal() -> None:
     }
     assert regrets["optimal"] == 0
     assert regrets["random"] > max(regrets["dsa"], regrets["mgm"])
+
+
+def test_real_variables_have_values_on_their_grids() -> None:
+    model = robochoc.Model("rail")
+    x, y = (model.robot(name).real("x", 0, 10, points=9) for name in "AB")
+    model.minimize((x - 2.5) ** 2 + (x - y + 3) ** 2 + abs(y - 4))
+    report = play(model.team, GameOptions(others="optimal", rounds=1))
+    assert report.cost == report.optimum == model.solve("dpop", refine=math.inf).cost
 
 
 @pytest.mark.parametrize("protocol", ["dsa", "mgm", "dsa-sdp", "mixed-dsa", "regret-matching"])
