@@ -36,7 +36,7 @@ class RealTranslator(Translator):
             return Scaled(Apply("sub", (total(plus), total(minus))))
         return Scaled(Apply("neg", (total(minus),)) if minus else total(plus))
 
-    def _element(self, index: Scaled, *array: Scaled) -> Never:  # noqa: ARG002 - real numbers are no indices
+    def _element(self, index: Scaled, *array: Scaled) -> Never:  # noqa: ARG002 - an index is an integer
         raise UntranslatableError
 
     def _bounds(self, expression: Expression) -> Interval:
