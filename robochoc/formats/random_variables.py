@@ -9,7 +9,7 @@ from decimal import Decimal
 from lxml import etree
 
 from robochoc.formats.definition_reader import read_integer
-from robochoc.formats.diagnostics import Diagnostic, MistakeError, shortened, suggestion
+from robochoc.formats.diagnostics import Diagnostic, DiagnosticCollector, MistakeError, shortened, suggestion
 from robochoc.formats.names import check_integer, check_name, check_unique
 from robochoc.formats.team_members import TeamMembers
 from robochoc.formats.xml import attribute, line
@@ -112,6 +112,18 @@ def refuse_uncertain(names: Iterable[str], randoms: Iterable[RandomVariable]) ->
             )
             hint = "a scenario can change only variables and constraints that no random variable affects"
             raise MistakeError(f"'{shortened(name)}' {what}", hint)
+
+
+def refuse_differing(robot: Robot, known: Iterable[RandomVariable]) -> None:
+    """Raise `InvalidInputError` if an added robot declares random variables otherwise than the team, in `known`."""
+    declared = {one.name: one for one in known}
+    report = DiagnosticCollector(robot.file)
+    for one in robot.random:
+        with report.at(one.line):
+            if declared.get(one.name, one) != one:
+                message = f"the random variable '{shortened(one.name)}' differs from that of the team"
+                raise MistakeError(message, "write the same outcomes, probabilities and seen_by in both")
+    report.finish()
 
 
 def differing_random_variables(members: TeamMembers) -> Iterator[Diagnostic]:

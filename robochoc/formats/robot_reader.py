@@ -67,7 +67,7 @@ from robochoc.model.problem import (
 )
 from robochoc.model.real import DEFAULT_PLACES
 from robochoc.model.symbols import with_table
-from robochoc.model.uncertainty import UncertaintyError, expected_copies, expected_robot
+from robochoc.model.uncertainty import UncertaintyError, expected_robot
 from robochoc.system.lazy_dataclass import dataclass
 
 _Part = TypeVar("_Part", Domain, Definition)
@@ -242,7 +242,7 @@ class _RobotReader:
         try:
             robot = expected_robot(declared)
             check_units(robot.costs, robot.kind)
-            copies = {name: expected_copies(declared, copied) for name, copied in file.copies.items()}
+            copies = {one.name: one.copies for one in robot.children if one.copies}
             conversion = CostConversion(10 ** (robot.costs.places - declared.costs.places))
             definitions = conversion.definitions(file.context.definitions)
         except UncertaintyError as error:

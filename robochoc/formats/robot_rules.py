@@ -98,7 +98,8 @@ def check_private(constraint: Constraint, own: Collection[str]) -> None:
     """Raise `MistakeError` unless a private constraint is over `own` variables only."""
     for name in constraint.variables:
         if name not in own:
-            hint = suggestion(name, own, "variables") + "; list shared constraints under agents_parent"
+            hint = suggestion(name, own, "variables")
+            hint += "; list shared constraints under agents_parent, and declare random variables"
             message = f"a private constraint over '{shortened(name)}', which is not a variable of this robot"
             raise MistakeError(message, hint)
 

@@ -14,7 +14,7 @@ from robochoc.formats.constraint_reader import ConstraintContext, read_shared
 from robochoc.formats.costs import places_used
 from robochoc.formats.definition_reader import read_integer
 from robochoc.formats.diagnostics import Diagnostic, DiagnosticCollector, InvalidInputError, MistakeError, shortened
-from robochoc.formats.random_variables import refuse_uncertain
+from robochoc.formats.random_variables import refuse_differing, refuse_uncertain
 from robochoc.formats.real_numbers import read_steps
 from robochoc.formats.robot_reader import RobotFile, read_robot_file
 from robochoc.formats.robot_rules import (
@@ -176,6 +176,7 @@ class _ScenarioReader:
             file = read_robot_file(self._folder / name, self._table).in_places(self._places)
             if not is_present:
                 _refuse_parts(file.robot)
+                refuse_differing(file.robot, [one for context in self._contexts.values() for one in context.random])
         except InvalidInputError as invalid:
             self._robot_mistakes += invalid.diagnostics
             self._has_unread_file = True

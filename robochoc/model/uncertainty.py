@@ -18,7 +18,7 @@ from dataclasses import replace
 from robochoc.model.constraint import INFINITE, Constraint, Function, Predicate, Relation, Semantics, Term, Variable
 from robochoc.model.cost_units import MAX_PLACES
 from robochoc.model.expression import Apply, Constant, names
-from robochoc.model.finer_units import in_finer_units, robot_in_places
+from robochoc.model.finer_units import robot_in_places
 from robochoc.model.magnitudes import MAX_COST
 from robochoc.model.problem import Robot, Team, Topic
 from robochoc.model.random_variable import RandomVariable
@@ -114,11 +114,6 @@ def expected_robot(robot: Robot) -> Robot:
     return _Expectation(robot).robot()
 
 
-def expected_copies(robot: Robot, copies: Iterable[Constraint]) -> tuple[Constraint, ...]:
-    """Return the equivalent of copies of TKC constraints in the file of `robot`, in its costs. See `expected_robot`."""
-    return _Expectation(robot).copies(copies) if robot.random else tuple(copies)
-
-
 def is_uncertain(team: Team) -> bool:
     """Return whether `team` is the unchanged equivalent of a problem with random variables."""
     return any(robot.random for robot in team.robots) and all(
@@ -163,7 +158,6 @@ class _Expectation:
                 f"the expected costs have {places} decimal places",
                 f"use probabilities and costs with fewer digits: at most {MAX_PLACES} places in all",
             )
-        self._finer: int = 10 ** (places - robot.costs.places)
         self._declared = robot_in_places(robot, places)
         self._parts = 0
         self._scaled: dict[tuple[int, int, int], tuple[Relation | Function, Relation | Function]] = {}
@@ -191,10 +185,6 @@ class _Expectation:
 
     def constraints(self, constraints: Iterable[Constraint]) -> tuple[Constraint, ...]:
         return tuple(part for one in constraints for part in self._in_all_outcomes(one))
-
-    def copies(self, constraints: Iterable[Constraint]) -> tuple[Constraint, ...]:
-        """Return the equivalent of constraints whose costs are in the unit of the file."""
-        return self.constraints(in_finer_units(one, self._finer) for one in constraints)
 
     def _places_of(self, constraint: Constraint, places: int) -> int:
         """Return the decimal places of the expected costs of a constraint whose costs have `places` decimal places."""

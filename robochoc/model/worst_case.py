@@ -10,7 +10,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
 
 from robochoc.model.assembly import Extras, assemble
 from robochoc.model.constraint import (
@@ -19,7 +18,6 @@ from robochoc.model.constraint import (
     ConstraintModel,
     Domain,
     Function,
-    Predicate,
     Relation,
     Semantics,
 )
@@ -42,7 +40,8 @@ def worst_case(team: Team) -> Team:
     """Return the team with the variables of `team`, in which an assignment costs the most that it can cost.
 
     Args:
-        team: The deterministic equivalent of a problem with random variables (`model/uncertainty.py`).
+        team: The deterministic equivalent of a problem with random variables (`model/uncertainty.py`), which does not
+            change.
 
     Raises:
         UncertaintyError: if a table would be too large.
@@ -57,12 +56,12 @@ def worst_case(team: Team) -> Team:
         randoms = outcomes.on_which(constraint.scope)
         if constraint.model == ConstraintModel.PKC:
             continue
-        if randoms and _is_soft(constraint):
+        if randoms and constraint.has_costs:
             soft.append(constraint)
         else:
             constraints += [outcomes.in_scenario(constraint, one) for _, one in outcomes.scenarios(randoms)]
     constraints += [tables.table(group, randoms) for group, randoms in connected(outcomes, soft)]
-    assembled = assemble(
+    return assemble(
         team.name,
         {robot.name: robot.variables for robot in team.robots},
         constraints,
@@ -75,7 +74,6 @@ def worst_case(team: Team) -> Team:
             parts={robot.name: parts for robot in team.robots if (parts := _parts(robot))},
         ),
     )
-    return replace(assembled, scenario=team.scenario)
 
 
 def connected(
@@ -93,16 +91,6 @@ def connected(
                 apart.append((group, names))
         groups = [*apart, (joined, found)]
     return ((group, list(names.values())) for group, names in groups)
-
-
-def _is_soft(constraint: Constraint) -> bool:
-    match constraint.definition:
-        case Predicate():
-            return constraint.cost != INFINITE
-        case Relation(semantics=semantics):
-            return semantics == Semantics.SOFT
-        case Function():
-            return True
 
 
 def _parts(robot: Robot) -> list[Constraint]:

@@ -12,7 +12,7 @@ from robochoc.model.random_variable import RandomVariable
 from robochoc.model.uncertainty import Outcomes
 from robochoc.modelling.codes import Symbols, codes_of
 from robochoc.modelling.errors import ModelError, ModelTypeError, SourceLine
-from robochoc.modelling.numbers import exact, places_of, whole_number
+from robochoc.modelling.numbers import exact, is_truth, places_of, whole_number
 from robochoc.modelling.terms import ModelVariable
 
 BY_CHANCE = ""
@@ -50,6 +50,8 @@ def random_variable(
         hint = "use decimals of at most nine places with the sum 1: {0: 0.333, 1: 0.333, 2: 0.334}"
         raise ModelError("a probability is not an exact decimal", hint, place) from None
     weights = tuple(int(one * 10**places) for one in chances.values())
+    if isinstance(seen_by, (str, ModelVariable)) or not isinstance(seen_by, Iterable):
+        raise ModelTypeError(f"invalid seen_by {seen_by!r}", "list variables: [relay]", place)
     observers = tuple(seen_by)
     for one in observers:
         if known.get(getattr(one, "name", "")) is not one or one.owner == BY_CHANCE:
@@ -76,7 +78,7 @@ def with_decisions(
 
 
 def _outcome(value: object) -> int:
-    whole = whole_number(value)
+    whole = None if is_truth(value) else whole_number(value)
     if whole is None:
         raise ModelTypeError(f"the outcome {value!r} is not an integer", "use integers, and tables for other values")
     return whole

@@ -1,14 +1,14 @@
 """Check a policy in the scenarios of a problem with random variables, and compute its costs.
 
-The costs follow from the constraints in the robots' files, outcome by outcome. They share no code with the equivalent
-problem that the robots have solved.
+The costs follow from the constraints in the robots' files, outcome by outcome, and not from the equivalent problem that
+the robots have solved.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from decimal import Decimal
 from fractions import Fraction
 
@@ -16,11 +16,9 @@ from robochoc.model.cost_units import Cost, common_units, cost_shown
 from robochoc.model.outcome import Outcome
 from robochoc.model.policies import Choice, PolicyReport, Risk
 from robochoc.model.problem import INFINITE, Assignment, Constraint, Function, RandomVariable, Team
-from robochoc.model.uncertainty import Outcomes, declared_robots, random_variables
+from robochoc.model.uncertainty import Outcomes, Scenario, declared_robots, random_variables
 from robochoc.model.worst_case import MAX_EVALUATIONS, connected
 from robochoc.verification.checker import RefutedError
-
-Scenario = Mapping[str, int]
 
 
 def policy_report(team: Team, outcome: Outcome, risk: Risk) -> PolicyReport:

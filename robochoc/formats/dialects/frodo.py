@@ -109,7 +109,7 @@ def merge(instances: Sequence[Instance]) -> Instance:
     Raises:
         InvalidInputError: if the files do not belong together, or a file is missing.
     """
-    result = replace(instances[0], self_agent="", agents=[], variables={}, random={}, constraints=[], notes=[])
+    result = replace(instances[0], self_agent="", agents=[], variables={}, random={}, laws={}, constraints=[], notes=[])
     if len(instances) > 1:
         _check_members(instances)
     _check_complete(instances)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -78,6 +79,18 @@ def test_mistakes_between_files(tmp_path: Path) -> None:
     assert found[0].startswith("Camera.xml:24 a private constraint over 'gale'")
 
 
+def test_the_hint_of_an_unknown_variable_names_random_variables(tmp_path: Path) -> None:
+    folder = tmp_path / "t"
+    shutil.copytree(GUSTS, folder)
+    for file in ("Camera.xml", "Relay.xml"):
+        (folder / file).write_text((folder / file).read_text().replace(WIND, ""))
+    with pytest.raises(InvalidInputError) as refused:
+        read_team(folder)
+    hints = [one.hint for one in refused.value.diagnostics if "a private constraint over 'wind'" in one.message]
+    assert len(hints) == len(refused.value.diagnostics)
+    assert all(hint.endswith("and declare random variables") for hint in hints)
+
+
 def test_an_undeclared_random_variable_is_named(tmp_path: Path) -> None:
     found = mistakes_in(tmp_path / "t", "Relay.xml", (WIND, ""), ('scope="relay wind"', 'scope="relay 1"'))
     assert found[0] == "Relay.xml:26 the constraint depends on the random variable 'wind'"
@@ -96,6 +109,25 @@ def test_a_scenario_cannot_change_what_is_uncertain(tmp_path: Path) -> None:
     assert [epoch.verdict for epoch in outcome.epochs] == ["optimal", "optimal"]
     with pytest.raises(UnsupportedError, match=r"t has a scenario\.xml"):
         solve(team, replace(SIMULATED, risk=Risk.WORST))
+
+
+def test_a_robot_that_joins_declares_the_same_random_variables(tmp_path: Path) -> None:
+    folder = tmp_path / "t"
+    shutil.copytree(GUSTS, folder)
+    (folder / "scenario.xml").write_text(
+        '<scenario><event after="solved"><add_agent file="late/Extra.xml"/></event></scenario>'
+    )
+    late = folder / "late" / "Extra.xml"
+    late.parent.mkdir()
+    extra = re.sub("<agents_neighbours>.*</agents_neighbours>", "", (GUSTS / "Relay.xml").read_text(), flags=re.DOTALL)
+    extra = extra.replace("relay", "extra").replace('seen_by="extra"', 'seen_by="relay"')
+    late.write_text(extra)
+    assert [epoch.verdict for epoch in solve(read_team(folder), SIMULATED).epochs] == ["optimal", "optimal"]
+    late.write_text(extra.replace("0.7:0|0.3:3", "0.6:0|0.4:3"))
+    with pytest.raises(
+        InvalidInputError, match="Extra.xml:11: the random variable 'wind' differs from that of the team"
+    ):
+        read_team(folder)
 
 
 def test_what_is_written_is_read_again(tmp_path: Path) -> None:

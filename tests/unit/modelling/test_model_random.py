@@ -56,6 +56,7 @@ def test_values_of_a_policy_are_the_users() -> None:
         (("g", {0: 1.5, 1: -0.5}), "the probability of an outcome is not positive"),
         (("g", {}), "0 outcomes"),
         (("g", {"a": 1}), "the outcome 'a' is not an integer"),
+        (("g", {True: 1}), "the outcome True is not an integer"),
         (("g", [0, 1]), "invalid distribution"),
         (("wind", {0: 1}), "variable 'wind' exists already"),
         (("a b", {0: 1}), "variable 'a b' is not a valid name"),
@@ -65,6 +66,13 @@ def test_mistakes_are_named(arguments: tuple[str, object], message: str) -> None
     with pytest.raises(ModelError) as refused:
         gusts().random(*arguments)
     assert message in str(refused.value)
+
+
+def test_seen_by_is_a_list_of_variables() -> None:
+    model = gusts()
+    for seen_by in ("Relay.height", model["Relay.height"], 3):
+        with pytest.raises(ModelError, match="invalid seen_by"):
+            model.random("g", {0: 1}, seen_by=seen_by)  # type: ignore[arg-type]
 
 
 def test_what_only_chance_decides_is_refused() -> None:

@@ -22,13 +22,10 @@ from robochoc.formats.dialects.pydcop.translation import ViolationCost
 from robochoc.formats.yaml_tree import Node, Scalar, scalar_text
 from robochoc.model.assembly import assemble
 from robochoc.model.constraint import (
-    INFINITE,
     Constraint,
     ConstraintModel,
     Function,
     Predicate,
-    Relation,
-    Semantics,
     Variable,
 )
 from robochoc.model.cost_units import CostUnits
@@ -208,7 +205,7 @@ class _PydcopReader:
         builder = _ConstraintBuilder(places, scale)
         constraints = [made for one in costs if (made := builder.constraint(one)) is not None]
         name = self._options.name or self._name()
-        if not builder.constant and not any(map(_is_soft, constraints)):
+        if not builder.constant and not any(one.has_costs for one in constraints):
             return assemble(name, variables, constraints)
         units = CostUnits(maximize, scale.places, builder.constant)
         return assemble(name, variables, constraints, kind=ProblemKind.DISWCSP, costs=units)
@@ -298,16 +295,6 @@ def _amounts(costs: Iterable[ParsedConstraint]) -> Iterator[int | Fraction | flo
                 yield cost
             case _:
                 pass
-
-
-def _is_soft(constraint: Constraint) -> bool:
-    match constraint.definition:
-        case Relation(semantics=semantics):
-            return semantics == Semantics.SOFT
-        case Predicate():
-            return constraint.cost != INFINITE
-        case Function():
-            return True
 
 
 def _values(name: str, node: Node, domains: Domains) -> DomainValues:

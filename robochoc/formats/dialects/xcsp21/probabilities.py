@@ -42,13 +42,16 @@ class ProbabilityTable:
             words = values.split()
             if len(words) != 1 or not now:
                 raise MistakeError(f"'{shortened(values.strip())}' is not an outcome", "write probability: value")
-            self._listed[integer(words[0])] = _probability(now)
+            outcome = integer(words[0])
+            if outcome in self._listed:
+                raise MistakeError(f"the outcome {outcome} occurs twice", "add up its probabilities")
+            self._listed[outcome] = _probability(now)
 
     def law(self, domain: Iterable[int], variable: str) -> Law:
         """Return the probabilities of the values in `domain` that are possible. Raises `MistakeError`."""
-        values = list(domain)
-        if outside := next((value for value in self._listed if value not in values), None):
-            message = f"the outcome {outside} is not in the domain of '{shortened(variable)}'"
+        values = dict.fromkeys(domain)
+        if outside := [value for value in self._listed if value not in values]:
+            message = f"the outcome {outside[0]} is not in the domain of '{shortened(variable)}'"
             raise MistakeError(message, "add it to the domain, or delete it")
         found = {value: self._listed.get(value, self._default) for value in values}
         if abs(sum(found.values(), Fraction(0)) - 1) > _TOLERANCE:
@@ -61,7 +64,7 @@ def random_variables(laws: Mapping[str, Law], most: int) -> tuple[list[RandomVar
     """Return random variables with the probabilities `laws`, by name, and whether a probability was rounded.
 
     Args:
-        laws: The laws.
+        laws: The laws, each with at most 10^`most` outcomes.
         most: The maximum number of decimal places of probabilities, at least 1.
     """
     exact = [decimal_places(one) for law in laws.values() for one in law.values()]
@@ -89,8 +92,10 @@ def _rounded(name: str, law: Law, places: int) -> RandomVariable:
     by_rest = sorted(law, key=lambda value: math.floor(law[value] * unit) - law[value] * unit)
     for number in range(missing):
         weights[by_rest[number % len(by_rest)]] += 1
-    if missing < 0:
-        weights[max(weights, key=weights.__getitem__)] += missing
+    for value in sorted(weights, key=weights.__getitem__, reverse=True):
+        taken = max(0, min(-missing, weights[value] - 1))
+        weights[value] -= taken
+        missing += taken
     return RandomVariable(name, tuple(weights), tuple(weights.values()), places)
 
 

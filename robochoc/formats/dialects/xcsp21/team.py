@@ -37,6 +37,7 @@ from robochoc.model.constraint import (
 )
 from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
 from robochoc.model.problem import ProblemKind, RandomVariable
+from robochoc.system.plain_text import counted
 
 
 def to_team(instance: Instance, dialect: str, options: ImportOptions) -> ImportResult:
@@ -133,6 +134,12 @@ class _TeamBuilder:
         if instance.random and not most:
             message = f"a constraint has {together} random variables, and costs {self._places} decimal places"
             refuse(instance.file, 0, message, "use fewer of them: expected costs have at most nine decimal places")
+        for name, law in instance.laws.items():
+            if len(law) > 10**most:
+                message = f"'{shortened(name)}' has {len(law):,} outcomes"
+                message += f", but probabilities with {counted(most, 'decimal place')}"
+                hint = "use fewer outcomes, or fewer random variables in a constraint"
+                refuse(instance.file, instance.random[name].line, message, hint)
         laws = {self._names.allowed(name): law for name, law in instance.laws.items()}
         found, is_rounded = random_variables(laws, most)
         if is_rounded:
@@ -169,7 +176,7 @@ class _TeamBuilder:
     def _asymmetric_parts(self, one: ForeignConstraint, sides: AsymmetricTable) -> Iterator[tuple[str, Constraint]]:
         if len(one.scope) != 2 or any(name in self._instance.random for name in one.scope):  # noqa: PLR2004 - a cost for each of two variables
             message = f"'{shortened(one.name)}' has two costs for each tuple, but {len(one.scope)} variables"
-            refuse(one.file, one.line, message, "use asymmetric costs only for constraints on two variables")
+            refuse(one.file, one.line, message, "use asymmetric costs only for constraints on two agents' variables")
         for variable, table in zip(one.scope, (sides.first, sides.second), strict=True):
             apart = self._owner[one.scope[0]] != self._owner[one.scope[1]]
             yield self._owner[variable] if apart else "", self._constraint(one, table)

@@ -13,6 +13,7 @@ from lxml import etree
 from robochoc.formats import InvalidInputError, check_team
 from robochoc.formats.dialects.dialect import ImportOptions
 from robochoc.formats.dialects.registry import read_foreign, recognise
+from robochoc.formats.dialects.xcsp21.probabilities import random_variables
 from robochoc.model.assembly import assemble
 from robochoc.model.constraint import Constraint, ConstraintModel, Domain, Predicate, Relation, Semantics, Variable
 from robochoc.model.expression import Type, parse
@@ -190,6 +191,7 @@ def test_one_file_an_agent_counts_copies_once(tmp_path: Path) -> None:
 
 LAW = '<probabilities><probability name="q" semantics="soft" arity="1">{}</probability></probabilities>'
 OF_Q = '<constraints><constraint name="z" scope="xa" reference="q"/></constraints></instance>'
+OF_W = '<constraints><constraint name="z" scope="w" reference="q"/></constraints>'
 RANDOM = '<variable name="w" domain="d" type="random"/></variables>'
 
 
@@ -200,6 +202,8 @@ RANDOM = '<variable name="w" domain="d" type="random"/></variables>'
         ("</relations>", f"</relations>{LAW.format('2: 1')}", "'2' is not a probability"),
         ("</relations>", f"</relations>{LAW.format('nan: 1')}", "'nan' is not a probability"),
         ("</relations>", f"</relations>{LAW.format('0.5: 1 2')}", "'1 2' is not an outcome"),
+        ("</relations>", f"</relations>{LAW.format('0.5: 1 | 0.5: 1')}", "the outcome 1 occurs twice"),
+        ("</variables>", f"{RANDOM}{LAW.format('1: 0')}{OF_W}", "the outcome 0 is not in the domain of 'w'"),
         ("</instance>", LAW.format("1: 1") + OF_Q, "are not those of one random variable"),
         ("1..3<", "1.5 2<", "the value 1.5 is not an integer (scale the values to integers)"),
         ("1..3<", "-infinity..3<", "'-infinity..3' is not an integer"),
@@ -228,6 +232,16 @@ def test_what_is_refused_is_named(old: str, new: str, message: str, tmp_path: Pa
     text = frodo(soft("4: 1 1 | 1 2", ""))
     assert old in text
     assert message in refused(text.replace(old, new), tmp_path)
+
+
+def test_rounded_probabilities_stay_positive(tmp_path: Path) -> None:
+    rare = dict.fromkeys(range(6), Fraction(1, 10_000))
+    (found,), is_rounded = random_variables({"w": rare | dict.fromkeys(range(6, 9), Fraction(3_333, 10_000))}, 1)
+    assert (sum(found.weights), min(found.weights), is_rounded) == (10, 1, True)
+    rows = " | ".join(f"0.05: {value}" for value in range(1, 21))
+    text = frodo(soft("0.00000001: 1 1", scope="xa w"), domain="1..20")
+    text = text.replace("</variables>", f"{RANDOM}{LAW.format(rows)}{OF_W}")
+    assert "'w' has 20 outcomes, but probabilities with 1 decimal place (use fewer outcomes" in refused(text, tmp_path)
 
 
 def test_expressions_in_other_forms_are_refused(tmp_path: Path) -> None:
