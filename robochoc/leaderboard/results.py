@@ -25,7 +25,8 @@ PEER_SEPARATOR = ":"
 """It separates the name of a peer from its algorithm; names of protocols do not contain it."""
 LARGEST_COUNT = 2**53
 Count = Annotated[int, msgspec.Meta(ge=0, le=LARGEST_COUNT)]
-Cost = Annotated[int, msgspec.Meta(ge=-(2**53), le=2**53)]
+Limit = Annotated[int, msgspec.Meta(gt=0, le=LARGEST_COUNT)]
+Cost = Annotated[int, msgspec.Meta(ge=-LARGEST_COUNT, le=LARGEST_COUNT)]
 Name = Annotated[str, msgspec.Meta(max_length=200, pattern=r"^[A-Za-z0-9][A-Za-z0-9 .,_+:-]*\Z")]
 Place = Annotated[str, msgspec.Meta(max_length=400, pattern=r"^([\w.]+:[\w.]+)?\Z")]
 Text = Annotated[str, msgspec.Meta(max_length=1000)]
@@ -41,9 +42,9 @@ class Budget(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         time_s: The maximum seconds.
     """
 
-    messages: Annotated[int, msgspec.Meta(gt=0, le=2**53)] = 20_000
-    ncccs: Annotated[int, msgspec.Meta(gt=0, le=2**53)] | None = None
-    cycles: Annotated[int, msgspec.Meta(gt=0, le=2**53)] | None = None
+    messages: Limit = 20_000
+    ncccs: Limit | None = None
+    cycles: Limit | None = None
     time_s: Annotated[float, msgspec.Meta(gt=0, le=1e6)] = 60.0
 
 

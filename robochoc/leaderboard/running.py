@@ -15,6 +15,7 @@ from robochoc.experiments.workers import LocalWorkers
 from robochoc.journal.reader import read_journal
 from robochoc.leaderboard.instances import SET_VERSION, Instance
 from robochoc.leaderboard.results import FORMAT, Budget, Entrant, LeaderboardResults, RunResult
+from robochoc.leaderboard.saved_runs import FAILED, SavedRuns
 from robochoc.privacy import Measure, PrivacyError, privacy_of
 from robochoc.run.distributed import COUNTED_LIMIT
 from robochoc.run.options import ScheduleName
@@ -23,7 +24,6 @@ from robochoc.system.plain_text import counted
 
 MEMORY_MB = 4096
 """The memory of a worker; a run that needs more fails."""
-_FAILED = {Status.LOST, Status.REFUTED, Status.MEMORY, Status.CRASHED, Status.ERROR}
 _DIGITS = 6
 """The decimal places of the privacy loss: its logarithms may differ between machines beyond them."""
 
@@ -51,6 +51,7 @@ def run_leaderboard(
     jobs: int = 1,
     times: bool = False,
     progress: Callable[[int, int], None] | None = None,
+    saved: SavedRuns | None = None,
 ) -> LeaderboardResults:
     """Run each protocol once on each instance.
 
@@ -62,20 +63,10 @@ def run_leaderboard(
         jobs: The number of worker processes.
         times: True if processor times are recorded, which differ from run to run.
         progress: Called with the number of finished runs and of all runs.
+        saved: Finished runs, which are not repeated. New runs are added.
     """
-    by_instance = [[_task(one, protocol, budget, seed) for protocol in protocols] for one in instances]
-    tasks = [task for bundle in by_instance for task in bundle]
-    places = {task.key: place for place, task in enumerate(tasks)}
-    where = [(one, protocol) for one in instances for protocol in protocols]
-    found: dict[int, RunResult] = {}
-    workers: Workers = LocalWorkers(jobs, MEMORY_MB)
-    with workers:
-        for task, row in workers.rows(by_instance):
-            place = places[task.key]
-            instance, protocol = where[place]
-            found[place] = _result(instance, protocol, row, times=times)
-            if progress:
-                progress(len(found), len(tasks))
+    pairs = [(one, protocol) for one in instances for protocol in protocols]
+    runs = run_pairs(pairs, budget, seed=seed, jobs=jobs, times=times, progress=progress, saved=saved)
     return LeaderboardResults(
         format=FORMAT,
         benchmark_set=SET_VERSION,
@@ -83,8 +74,40 @@ def run_leaderboard(
         seed=seed,
         budget=budget,
         entrants=list(protocols),
-        runs=[found[place] for place in range(len(tasks))],
+        runs=runs,
     )
+
+
+def run_pairs(
+    pairs: Sequence[tuple[Instance, Entrant]],
+    budget: Budget,
+    *,
+    seed: int,
+    jobs: int,
+    times: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+    saved: SavedRuns | None = None,
+) -> list[RunResult]:
+    """Run protocols on instances, and return the results in the order of `pairs`, which are different.
+
+    For the other arguments see `run_leaderboard`.
+    """
+    saved = saved or SavedRuns()
+    missing = [pair for pair in pairs if (pair[0].name, pair[1].name) not in saved.found]
+    tasks = [_task(instance, protocol, budget, seed) for instance, protocol in missing]
+    where = {task.key: pair for task, pair in zip(tasks, missing, strict=True)}
+    by_instance: dict[Instance, list[Task]] = {}
+    for (instance, _), task in zip(missing, tasks, strict=True):
+        by_instance.setdefault(instance, []).append(task)
+    done = len(pairs) - len(missing)
+    workers: Workers = LocalWorkers(jobs, MEMORY_MB)
+    with workers:
+        for task, row in workers.rows(by_instance.values()):
+            saved.add(_result(*where[task.key], row, times=times))
+            done += 1
+            if progress:
+                progress(done, len(pairs))
+    return [saved.found[instance.name, protocol.name] for instance, protocol in pairs]
 
 
 def _task(instance: Instance, protocol: Entrant, budget: Budget, seed: int) -> Task:
@@ -135,7 +158,7 @@ def failures(results: LeaderboardResults) -> Iterator[str]:
     """Yield a sentence for each entrant with runs that failed, which is not the fault of a limit or the problem."""
     for one in results.entrants:
         own = [run for run in results.runs if run.protocol == one.name]
-        failed = [run for run in own if run.status in _FAILED]
+        failed = [run for run in own if run.status in FAILED]
         if failed:
             first = f"first {failed[0].instance}: {failed[0].reason or failed[0].status}"
             yield f"{one.name}: {len(failed):,} of {counted(len(own), 'run')} failed, {first}"

@@ -13,8 +13,8 @@ from collections.abc import Mapping, Sequence
 from robochoc.experiments.statistics import MeanInterval, holm_corrected, mean_interval, paired_p_value
 from robochoc.experiments.task import Status
 from robochoc.leaderboard.certificates import Certificate, published
+from robochoc.leaderboard.claims import claims_proof
 from robochoc.leaderboard.results import Budget, LeaderboardResults, RunResult
-from robochoc.model.outcome import Verdict
 from robochoc.system.lazy_dataclass import dataclass
 
 SIGNIFICANT = 0.05
@@ -171,13 +171,12 @@ def _score(
 ) -> Score:
     certificates = published()
     areas = [area(run, certificates[run.instance], budget) for run in runs]
-    proofs = {Verdict.OPTIMAL, Verdict.NO_SOLUTION}
     return Score(
         protocol=name,
         rank=mean_interval(ranks),
         is_best=is_best,
         best=sum(one == 0 for one in gaps),
-        proved=sum(run.verdict in proofs for run in runs),
+        proved=sum(map(claims_proof, runs)),
         runs=len(runs),
         gap=mean_interval(gaps),
         area=_mean(areas),

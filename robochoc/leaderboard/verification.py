@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from itertools import groupby
 
@@ -13,7 +13,7 @@ from robochoc.leaderboard.claims import claims_proof, wrong_claims
 from robochoc.leaderboard.export import checked_team
 from robochoc.leaderboard.instances import instance_named
 from robochoc.leaderboard.results import Entrant, LeaderboardResults, RunResult, is_peer_name
-from robochoc.leaderboard.running import comparable, entrants, met_time_limit, run_leaderboard
+from robochoc.leaderboard.running import comparable, entrants, met_time_limit, run_pairs
 from robochoc.model.change import team_after_events
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
@@ -43,6 +43,16 @@ def wrong_answers(results: LeaderboardResults) -> Iterator[str]:
                 yield f"{run.protocol} on {name}: {fault}"
 
 
+def has_answer(run: RunResult) -> bool:
+    """Return whether a run has an answer: an assignment, or the claim that there is none."""
+    return run.verdict == Verdict.NO_SOLUTION or _has_assignment(run)
+
+
+def _has_assignment(run: RunResult) -> bool:
+    # A run that a limit ended is unknown, but has a cost if its best assignment satisfies all hard constraints.
+    return run.verdict in _ANSWERS or run.cost is not None
+
+
 def _known_traits(given: Sequence[Entrant]) -> dict[str, Traits]:
     """Return the traits of the protocols that can be found here, by name."""
     found = {}
@@ -56,8 +66,7 @@ def _faults(run: RunResult, team: Team, best: Certificate) -> Iterator[str]:
     """Yield the reasons why an answer is wrong. `team` is the team at the end of the run."""
     if run.verdict == Verdict.NO_SOLUTION and best.verdict != Verdict.NO_SOLUTION:
         yield f"claims no-solution, but {best.proved_by} found one"
-    # A run that a limit ended is unknown, but has a cost if its best assignment satisfies all hard constraints.
-    if run.verdict not in _ANSWERS and run.cost is None:
+    if not _has_assignment(run):
         return
     yield from violations(team, run.assignment)
     if any(name not in run.assignment for name in team.variables):
@@ -93,52 +102,57 @@ class Repetition:
         self.remarks: list[str] = []
         self.unfinished = 0
         self.faults: list[str] = []
-        names = {one.name for one in results.entrants if self._can_be_repeated(one)}
-        here = [run for run in results.runs if run.protocol in names]
-        incomplete = {name for name in names if not protocol_named(name).traits.complete}
+        self._here: dict[str, Entrant] = {}
+        for one in results.entrants:
+            self._find(one)
+        here = [run for run in results.runs if run.protocol in self._here]
+        incomplete = {name for name in self._here if not protocol_named(name).traits.complete}
         proofs = [run for run in here if run.protocol in incomplete and claims_proof(run)]
         chosen = {(run.instance, run.protocol) for run in (*selected(here, number), *proofs)}
         self.runs = [run for run in here if (run.instance, run.protocol) in chosen]
 
-    def _can_be_repeated(self, before: Entrant) -> bool:
-        """Return whether the protocol is here, with the same source files. Otherwise note the reason."""
+    def _find(self, before: Entrant) -> None:
+        """Find the protocol here, with the same source files, to repeat its runs. Otherwise note the reason."""
         runs = counted(sum(run.protocol == before.name for run in self._results.runs), "run")
         if is_peer_name(before.name):
             self.remarks.append(f"{runs} of {before.name} not repeated: only the answers of peers are checked")
-            return False
+            return
         try:
             (now,) = entrants([before.name])
         except UnknownProtocolError as unknown:
             hint = f"its module is not installed; if you trust it, add --protocol {before.place}"
             self.remarks.append(f"{runs} of {before.name} not repeated: {hint if before.place else unknown}")
-            return False
+            return
+        if now.name != before.name:
+            self.faults.append(f"{before.name}: the protocol is called {now.name}")
+            return
         if not now.source and before.source:
             self.faults.append(f"{before.name}: is a protocol of robochoc, but the results have a digest of its files")
         elif now.source != before.source:
             self.remarks.append(f"{runs} of {before.name} not repeated: its files ({now.package}) have changed")
-            return False
-        return True
+            return
+        self._here[before.name] = now
 
-    def changed_runs(self, jobs: int = 1) -> Iterator[str]:
+    def changed_runs(self, jobs: int = 1, progress: Callable[[int, int], None] | None = None) -> Iterator[str]:
         """Repeat the runs, and yield a sentence for each one with another result.
 
         A repeated run that meets the time limit is not compared, but noted in the remarks.
+
+        Args:
+            jobs: The number of worker processes.
+            progress: Called with the number of finished runs and of all runs.
         """
         yield from self.faults
-        by_instance: dict[str, list[RunResult]] = {}
-        for run in self.runs:
-            by_instance.setdefault(run.instance, []).append(run)
-        for name, own in by_instance.items():
-            named = entrants([run.protocol for run in own])
-            seed = self._results.seed
-            repeated = run_leaderboard(named, [instance_named(name)], self._budget, seed=seed, jobs=jobs)
-            for before, now in zip(own, repeated.runs, strict=True):
-                if met_time_limit(now):
-                    self.unfinished += 1
-                    limit = f"{self._budget.time_s:g} s: increase --timeout"
-                    self.remarks.append(f"{before.protocol} on {name} not compared: it met the time limit of {limit}")
-                elif fields := _differences(comparable(before), comparable(now)):
-                    yield f"{before.protocol} on {name}: another {', '.join(fields)}"
+        pairs = [(instance_named(run.instance), self._here[run.protocol]) for run in self.runs]
+        repeated = run_pairs(pairs, self._budget, seed=self._results.seed, jobs=jobs, progress=progress)
+        for before, now in zip(self.runs, repeated, strict=True):
+            run = f"{before.protocol} on {before.instance}"
+            if met_time_limit(now):
+                self.unfinished += 1
+                limit = f"{self._budget.time_s:g} s: increase --timeout"
+                self.remarks.append(f"{run} not compared: it met the time limit of {limit}")
+            elif fields := _differences(comparable(before), comparable(now)):
+                yield f"{run}: another {', '.join(fields)}"
 
 
 def _differences(before: RunResult, now: RunResult) -> list[str]:

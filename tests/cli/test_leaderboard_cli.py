@@ -45,7 +45,7 @@ def test_run_verify_submit_and_show(tmp_path: Path) -> None:
     done = robochoc_within("leaderboard", "run", "dpop", "MGM", "dba", *TWO, "-o", path, "--budget", "messages=300")
     assert (done.returncode, done.stderr) == (0, "")
     checked = robochoc_within("leaderboard", "verify", path, "--rerun", "2", "--jobs", "1")
-    assert checked.stdout == f"{path}: 6 answers are right; 2 repeated runs gave the same results\n"
+    assert checked.stdout == f"{path}: 6 runs, 2 answers, no fault; 2 repeated runs gave the same results\n"
     added = robochoc_within("leaderboard", "submit", path, "--board", board, "--rerun", "2", "--jobs", "1")
     assert (added.returncode, added.stderr) == (0, checked.stdout)
     shown = robochoc_within("leaderboard", "show", board).stdout
@@ -78,13 +78,13 @@ def test_a_protocol_of_a_module_enters(tmp_path: Path, monkeypatch: pytest.Monke
         protocol_named("breakout")
     assert entrant["place"] == word
     unknown = robochoc_within("leaderboard", "verify", path, "--jobs", "1")
-    assert (unknown.returncode, unknown.stdout) == (0, f"{path}: 2 answers are right\n")
+    assert (unknown.returncode, unknown.stdout) == (0, f"{path}: 2 runs, 0 answers, no fault\n")
     assert f"2 runs of breakout not repeated: its module is not installed; if you trust it, add --protocol {word}" in (
         unknown.stderr
     )
     known = robochoc_within("leaderboard", "verify", path, "--jobs", "1", "--rerun", "1", "--protocol", word)
     assert (known.returncode, known.stderr) == (0, "")
-    assert known.stdout == f"{path}: 2 answers are right; 1 repeated run gave the same result\n"
+    assert known.stdout == f"{path}: 2 runs, 0 answers, no fault; 1 repeated run gave the same result\n"
     absent = robochoc_within("leaderboard", "verify", path, "--protocol", "nope:Nope")
     assert (absent.returncode, "No module named 'nope'" in absent.stderr) == (2, True)
     altered = json.loads(path.read_text())

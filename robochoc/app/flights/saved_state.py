@@ -24,7 +24,7 @@ from robochoc.app.sketch import open_from_disk
 from robochoc.app.sketch.checks import errors_of
 from robochoc.app.sketch.element_checks import is_sound
 from robochoc.app.sketch.files import MAX_SKETCH, zipped
-from robochoc.app.sketch.open_from_disk import DAMAGED, bounded_archive
+from robochoc.app.sketch.open_from_disk import bounded_archive
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.store import FILES
 

@@ -7,7 +7,6 @@ import os
 import re
 import stat
 import zipfile
-import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -21,6 +20,7 @@ from robochoc.formats.dialects.dialect import ImportOptions
 from robochoc.formats.dialects.registry import first_bytes, read_foreign, recognise, unknown_format_error
 from robochoc.formats.team_writer import SKETCH_FILE
 from robochoc.model.problem import Team
+from robochoc.system.archives import DAMAGED
 from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.temporary_files import PrivateFolder
 
@@ -30,8 +30,6 @@ MAX_BYTES = 64 << 20
 """The maximum number of bytes in all files of a team, or in a file of another tool."""
 _PARTS = re.compile(r"(?:(?!late\d*/)[^/]+/)?((?:late\d*/)?[^/]+\.xml|sketch\.json)")
 """The files that are unpacked from an archive: the files of a team, which may be in a folder."""
-DAMAGED = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError, OSError)
-"""The exceptions that a damaged archive can cause."""
 
 
 @dataclass(frozen=True)

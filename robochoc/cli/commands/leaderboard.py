@@ -16,11 +16,12 @@ from robochoc.system.plain_text import counted, on_one_line
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from robochoc.communication.search_result import Progress
     from robochoc.leaderboard.instances import Instance
     from robochoc.leaderboard.peers.running import PeerEntrant
     from robochoc.leaderboard.results import Budget, LeaderboardResults
+    from robochoc.leaderboard.saved_runs import SavedRuns
 
-SIZES = ("small", "medium")
 BUDGET = {"messages": "messages", "ncccs": "ncccs", "cycles": "cycles", "time": "time_s"}
 MOST_FAULTS = 20
 FORMATS = ("robochoc", "xcsp3", "frodo", "pydcop")
@@ -32,7 +33,7 @@ jobs_option = click.option(
     "--jobs", type=WholeNumber(1, 1024), metavar="N", help="Number of workers.  [default: one per processor]"
 )
 size_option = click.option(
-    "--size", "sizes", multiple=True, type=click.Choice(SIZES), help="Size. Repeatable.  [default: all]"
+    "--size", "sizes", multiple=True, metavar="NAME", help="Size: small or medium. Repeatable.  [default: all]"
 )
 
 
@@ -174,7 +175,8 @@ def run(  # noqa: PLR0913, PLR0917 - options
     """Run protocols on instances of the set, and write the results as JSON.
 
     A protocol of an outside package is named as it is installed, or as MODULE:CLASS, also in the current folder. The
-    same command writes the same bytes, unless --times is given or a run meets its time limit.
+    same command writes the same bytes, unless --times is given or a run meets its time limit. An interrupted command
+    continues when it is repeated: the file with the ending .part has its finished runs.
 
     Peers are other tools: FRODO, pyDCOP and PropFlow, which --peer names. Only the time limit binds them, and their
     results may differ from run to run.
@@ -185,29 +187,32 @@ def run(  # noqa: PLR0913, PLR0917 - options
     robochoc leaderboard run my_package.protocol:MyProtocol --budget messages=5000,cycles=200
     """  # noqa: D301 - \\b keeps click from wrapping the lines
     from robochoc.cli.reports.progress import progress_line
-    from robochoc.communication.search_result import Progress
     from robochoc.leaderboard.outside import named_protocols
     from robochoc.leaderboard.peers.claims import wrong_claims_of_peers
     from robochoc.leaderboard.results import is_peer_name, write_results
     from robochoc.leaderboard.running import entrants, failures, run_leaderboard
+    from robochoc.leaderboard.saved_runs import SavedRuns, command_line
     from robochoc.system.posix import usable_processors
 
     chosen, budget = list(_instances(families, sizes, range(seeds))), _budget(budget_words)
     peers = [word for word in protocols if is_peer_name(word)]
     own = [word for word in protocols if not is_peer_name(word)]
-    with errors_as_failures("leaderboard"), named_protocols(own) as names, progress_line("leaderboard") as show:
-        entered = _peers(peers, peer_words)
-        common = _Common(
-            jobs=jobs or usable_processors(),
-            times=times,
-            progress=show and (lambda done, planned: show(Progress(0, 0, f"{done:,} of {planned:,} runs"))),
-        )
-        results = run_leaderboard(entrants(names), chosen, budget, seed=seed, **common)
-        if entered:
-            from robochoc.leaderboard.peers.running import with_peers
+    unfinished = output.with_name(f"{output.name}.part")
+    with errors_as_failures("leaderboard"), named_protocols(own) as names:
+        found, entered = entrants(names), _peers(peers, peer_words)
+        command = command_line([*found, *(one.entrant for one in entered)], chosen, budget, seed=seed, times=times)
+        is_file = output.is_file() or not output.exists()
+        with SavedRuns(unfinished if is_file else None, command) as saved, progress_line("leaderboard") as show:
+            if saved.found:
+                click.echo(f"{unfinished}: {counted(len(saved.found), 'run')} found, not repeated", err=True)
+            common = _Common(jobs=jobs or usable_processors(), times=times, progress=_run_counter(show), saved=saved)
+            results = run_leaderboard(found, chosen, budget, seed=seed, **common)
+            if entered:
+                from robochoc.leaderboard.peers.running import with_peers
 
-            results = with_peers(results, entered, chosen, **common)
-        write_results(results, output)
+                results = with_peers(results, entered, chosen, **common)
+            write_results(results, output)
+            saved.delete()
     for line in (*failures(results), *wrong_claims_of_peers(results.runs)):
         click.echo(on_one_line(line), err=True)
     click.echo(f"{output}: {counted(len(results.runs), 'run')}; next: robochoc leaderboard show {output}")
@@ -314,23 +319,36 @@ def _verified(
     Raises:
         Failure: if there are faults.
     """
+    from robochoc.cli.reports.progress import progress_line
     from robochoc.leaderboard.outside import named_protocols
 
     with errors_as_failures(path), named_protocols(protocols) as names:
         from robochoc.leaderboard.running import entrants
-        from robochoc.leaderboard.verification import Repetition, wrong_answers
+        from robochoc.leaderboard.verification import Repetition, has_answer, wrong_answers
         from robochoc.system.posix import usable_processors
 
         entrants(names)  # a protocol that cannot be used is an error
         repetition = Repetition(found, number, limit_s)
-        faults = [*wrong_answers(found), *repetition.changed_runs(jobs or usable_processors())]
+        with progress_line("leaderboard") as show:
+            changed = repetition.changed_runs(jobs or usable_processors(), _run_counter(show))
+            faults = [*wrong_answers(found), *changed]
         for remark in repetition.remarks:
             click.echo(f"{path}: {on_one_line(remark)}", err=True)
         _fail(path, faults)
-        answers, many = len(found.runs), len(repetition.runs) - repetition.unfinished
-        summary = f"{counted(answers, 'answer')} {'is' if answers == 1 else 'are'} right"
+        answers, many = sum(map(has_answer, found.runs)), len(repetition.runs) - repetition.unfinished
+        summary = f"{counted(len(found.runs), 'run')}, {counted(answers, 'answer')}, no fault"
         repeated = f"; {counted(many, 'repeated run')} gave the same result{'' if many == 1 else 's'}"
         yield summary + (repeated if many else "")
+
+
+def _run_counter(show: Callable[[Progress], None] | None) -> Callable[[int, int], None] | None:
+    """Return a function that shows the number of finished runs, and the elapsed time."""
+    import time
+
+    from robochoc.communication.search_result import Progress
+
+    began = time.monotonic()
+    return show and (lambda done, planned: show(Progress(0, time.monotonic() - began, f"{done:,} of {planned:,} runs")))
 
 
 def _fail(path: Path, faults: Sequence[str]) -> None:
@@ -356,6 +374,7 @@ class _Common(TypedDict):
     jobs: int
     times: bool
     progress: Callable[[int, int], None] | None
+    saved: SavedRuns
 
 
 def _peers(words: Sequence[str], places: Sequence[str]) -> list[PeerEntrant]:

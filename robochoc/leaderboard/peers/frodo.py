@@ -20,6 +20,7 @@ from robochoc.formats.xml import parsed_tree
 from robochoc.leaderboard.peers.peer import Algorithm, Peer, PeerAnswer, PeerError, exported, last_line
 from robochoc.leaderboard.peers.program import LARGEST_FILE, EndedProgram
 from robochoc.model.problem import Team
+from robochoc.system.archives import DAMAGED
 
 MEMORY = "4g"
 _DIGITS = 15
@@ -95,7 +96,7 @@ class Frodo(Peer):
                 return file.read(LARGEST_FILE)
         except FileNotFoundError:
             raise self.unusable("does not exist") from None
-        except (OSError, zipfile.BadZipFile, KeyError, NotImplementedError, EOFError):
+        except (*DAMAGED, KeyError):
             raise self.unusable(f"is not FRODO's jar, with {_RESOURCES}{algorithm.words[0]}") from None
 
 

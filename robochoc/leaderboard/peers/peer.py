@@ -115,13 +115,11 @@ class Peer(ABC):
 
     def _reported(self, *command: str) -> str:
         """Return the first line that a command prints. Raises `UnusablePeerError` if it fails."""
-        folder = PrivateFolder()
-        try:
-            ended = run_program(command, folder.path, START_S)
-        except OSError as error:
-            raise self.unusable(f"cannot be started ({error.strerror})") from None
-        finally:
-            folder.close()
+        with PrivateFolder() as folder:
+            try:
+                ended = run_program(command, folder, START_S)
+            except OSError as error:
+                raise self.unusable(f"cannot be started ({error.strerror})") from None
         if ended.status != 0:
             raise self.unusable(last_line(ended) or f"ended with status {ended.status}")
         return on_one_line(ended.output.strip(), 100)

@@ -23,6 +23,7 @@ from robochoc.leaderboard.peers.program import run_program
 from robochoc.leaderboard.peers.propflow import Propflow
 from robochoc.leaderboard.peers.pydcop import Pydcop
 from robochoc.leaderboard.results import LARGEST_COUNT, PEER_SEPARATOR, Budget, Entrant, LeaderboardResults, RunResult
+from robochoc.leaderboard.saved_runs import SavedRuns
 from robochoc.model.constraint import ConstraintModel
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ProblemKind, Team
@@ -96,6 +97,7 @@ def with_peers(
     jobs: int = 1,
     times: bool = False,
     progress: Callable[[int, int], None] | None = None,
+    saved: SavedRuns | None = None,
 ) -> LeaderboardResults:
     """Run each peer once on each instance, and return the results with these runs.
 
@@ -106,18 +108,22 @@ def with_peers(
         jobs: The number of peers that run at the same time.
         times: True if processor times are recorded.
         progress: Called with the number of finished runs and of all runs.
+        saved: Finished runs, which are not repeated. New runs are added.
     """
+    saved = saved or SavedRuns()
     pairs = [(one, peer) for one in instances for peer in peers]
-    show = progress and (lambda done, _: progress(done, len(pairs)))
+    missing = [pair for pair in pairs if (pair[0].name, pair[1].entrant.name) not in saved.found]
+    before = len(pairs) - len(missing)
+    show = progress and (lambda done, _: progress(before + done, len(pairs)))
     with PrivateFolder() as folder:
         function = partial(_run, folder=folder, budget=results.budget, times=times)
         with ParallelMap(function, jobs, show) as running:
-            found = [run for _, run in running.results(pairs)]
-    by_instance = {one.name: [run for run in results.runs if run.instance == one.name] for one in instances}
-    for run in found:
-        by_instance[run.instance].append(run)
-    runs = [run for own in by_instance.values() for run in own]
+            for _, run in running.results(missing):
+                saved.add(run)
+    found = saved.found | {(run.instance, run.protocol): run for run in results.runs}
     entrants = [*results.entrants, *(one.entrant for one in peers)]
+    keys = [(instance.name, entrant.name) for instance in instances for entrant in entrants]
+    runs = [found[key] for key in keys if key in found]
     return msgspec.structs.replace(results, entrants=entrants, runs=runs)
 
 

@@ -119,7 +119,7 @@ def test_a_robot_that_joins_declares_the_same_random_variables(tmp_path: Path) -
     )
     late = folder / "late" / "Extra.xml"
     late.parent.mkdir()
-    extra = re.sub("<agents_neighbours>.*</agents_neighbours>", "", (GUSTS / "Relay.xml").read_text(), flags=re.DOTALL)
+    extra = re.sub("<agents_neighbours>.*</agents_neighbours>", "<agents_neighbours/>", (GUSTS / "Relay.xml").read_text(), flags=re.DOTALL)
     extra = extra.replace("relay", "extra").replace('seen_by="extra"', 'seen_by="relay"')
     late.write_text(extra)
     assert [epoch.verdict for epoch in solve(read_team(folder), SIMULATED).epochs] == ["optimal", "optimal"]

@@ -22,9 +22,9 @@ BUDGET = Budget(messages=5000, time_s=600)
 @pytest.mark.more
 def test_two_runs_of_a_random_part_are_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     chance = drawn("leaderboard")
-    part = [chance.choice(list(instances([family], ["small"]))) for family in FAMILIES]
+    part = [chance.choice(list(instances([family], ["small"]))) for family in chance.sample(list(FAMILIES), 8)]
     assert [sha256_of_team(one.team()) for one in part] == [published()[one.name].sha256 for one in part]
-    chosen = entrants(chance.sample(PROTOCOLS, 4))
+    chosen = entrants(chance.sample(PROTOCOLS, 3))
     by_workers = run_leaderboard(chosen, part, BUDGET, jobs=2)
     monkeypatch.setattr("robochoc.leaderboard.running.LocalWorkers", lambda *_: RunsHere())
     again = run_leaderboard(chosen, part, BUDGET)

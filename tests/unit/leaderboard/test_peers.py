@@ -250,6 +250,11 @@ def test_frodo_is_called_and_its_solution_is_read(tmp_path: Path) -> None:
                     peer.answer(tmp_path, ended)
     with pytest.raises(UnusablePeerError, match="is not FRODO's jar, with frodo2/algorithms/none"):
         peer.command(instance_named("random-small-0").team(), Algorithm(("none",)), tmp_path, 1)
+    encrypted = bytearray(peer.place.read_bytes())
+    encrypted[encrypted.index(b"PK\x01\x02") + 8] |= 1
+    peer.place.write_bytes(encrypted)
+    with pytest.raises(UnusablePeerError, match="is not FRODO's jar"):
+        peer.version()
 
 
 def test_a_missing_peer_has_one_sentence(tmp_path: Path) -> None:
@@ -312,4 +317,4 @@ def test_the_command_runs_peers_beside_protocols(tmp_path: Path, monkeypatch: py
     alone = robochoc_within("leaderboard", "run", *words[1:], "-o", tmp_path / "alone.json")
     assert (alone.returncode, alone.stdout.partition(";")[0]) == (0, f"{tmp_path / 'alone.json'}: 1 run")
     checked = robochoc_within("leaderboard", "verify", path, "--rerun", "1", "--jobs", "1")
-    assert (checked.returncode, "2 answers are right" in checked.stdout) == (0, True)
+    assert (checked.returncode, "2 runs, 2 answers, no fault" in checked.stdout) == (0, True)

@@ -13,8 +13,9 @@ from robochoc.experiments.task import Status
 from robochoc.formats.diagnostics import InvalidInputError
 from robochoc.leaderboard.board import read_board, submit
 from robochoc.leaderboard.instances import instances
-from robochoc.leaderboard.results import Budget, LeaderboardResults, read_results, write_results
+from robochoc.leaderboard.results import Budget, LeaderboardResults, RunResult, read_results, write_results
 from robochoc.leaderboard.running import entrants, run_leaderboard
+from robochoc.leaderboard.saved_runs import SavedRuns, command_line
 from robochoc.leaderboard.verification import Repetition, wrong_answers
 from robochoc.run.registry import UnknownProtocolError
 from tests.support.cases import cases
@@ -43,6 +44,40 @@ def test_the_same_runs_are_the_same_bytes(results: LeaderboardResults, tmp_path:
     write_results(again, tmp_path / "two.json")
     assert (tmp_path / "one.json").read_bytes() == (tmp_path / "two.json").read_bytes()
     assert read_results(tmp_path / "one.json") == results
+
+
+class Interrupted(SavedRuns):
+    """Saved runs whose command is interrupted after four of them."""
+
+    def add(self, run: RunResult) -> None:
+        super().add(run)
+        if len(self.found) == 4:
+            raise KeyboardInterrupt
+
+
+def test_an_interrupted_command_continues_with_the_same_bytes(results: LeaderboardResults, tmp_path: Path) -> None:
+    path, chosen = tmp_path / "runs.part", entrants(["dpop", "mgm", "afc-ng"])
+    command = command_line(chosen, FEW, BUDGET, seed=0, times=False)
+    with pytest.raises(KeyboardInterrupt), Interrupted(path, command) as saved:
+        run_leaderboard(chosen, FEW, BUDGET, saved=saved)
+    path.write_bytes(path.read_bytes()[:-3])  # as if the last line were written in part
+    done: list[int] = []
+    with SavedRuns(path, command) as saved:
+        assert list(saved.found.values()) == results.runs[:3]
+        with pytest.raises(InvalidInputError, match="is being written by another"):
+            SavedRuns(path, command)
+        again = run_leaderboard(chosen, FEW, BUDGET, saved=saved, progress=lambda now, _: done.append(now))
+    write_results(results, tmp_path / "one.json")
+    write_results(again, tmp_path / "two.json")
+    assert (tmp_path / "one.json").read_bytes() == (tmp_path / "two.json").read_bytes()
+    assert done == list(range(4, len(results.runs) + 1))
+    other = command_line(chosen, FEW, BUDGET, seed=1, times=False)
+    with pytest.raises(InvalidInputError, match="has the runs of another command"):
+        SavedRuns(path, other)
+    path.unlink()
+    with SavedRuns(path, other) as saved:
+        saved.add(msgspec.structs.replace(results.runs[0], status=Status.CRASHED))
+    assert not path.exists()  # a failed run is repeated
 
 
 def test_answers_are_right_and_runs_are_repeated(results: LeaderboardResults) -> None:
@@ -160,6 +195,8 @@ def test_protocols_that_cannot_be_found_are_not_repeated(results: LeaderboardRes
     assert absent.remarks == [
         "4 runs of mine not repeated: its module is not installed; if you trust it, add --protocol my_module:Mine"
     ]
+    other = Repetition(with_entrant(results, name="DPOP"), None)
+    assert list(other.changed_runs()) == ["DPOP: the protocol is called dpop"]
     ours = Repetition(with_entrant(results, source="1"), 0)
     assert list(ours.changed_runs()) == ["dpop: is a protocol of robochoc, but the results have a digest of its files"]
 
