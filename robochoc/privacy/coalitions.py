@@ -84,7 +84,7 @@ class CoalitionReport:
         robots: All robots, the highest priority first.
         size: The number of robots in each coalition.
         coins: The number of seeds that were tried for the other robots' random numbers.
-        is_exact: Other robots drew no random numbers that a coalition can see.
+        is_exact: True if the other robots drew no random numbers that a coalition can see.
         losses: The losses to each coalition with secrets left to learn.
     """
 
@@ -167,7 +167,7 @@ def coalition_report(
 def _check(team: Team, protocol: type[Protocol], size: int) -> None:
     robots = len(team.order)
     if not 1 <= size < robots:
-        raise PrivacyError(f"a coalition of {size} of {robots} robots has nobody to learn of: use 1 to {robots - 1}")
+        raise PrivacyError(f"a coalition of {size} robots leaves none of {robots}: use 1 to {robots - 1}")
     if any(one.model == ConstraintModel.PKC for one in team.constraints()):
         raise PrivacyError("coalitions are not measured for partially known constraints")
     masks = any(kind.masked for kind in types_by_name(protocol).values())

@@ -1,4 +1,4 @@
-"""PC-SyncBB: shares, comparisons, the optimum, and what a minority sees."""
+"""PC-SyncBB: shares, comparisons, the optimum, and the view of a minority."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ def random_team(chance: Random, *, most_cost: int = 9) -> Team:
     constraints = [
         _constraint(chance, f"C{number}", everything, objectives, most_cost) for number in range(chance.randint(2, 8))
     ]
-    for variable in everything if chance.random() < 0.7 else ():  # what is cheap in one objective is dear in another
+    for variable in everything if chance.random() < 0.7 else ():  # cheap in one objective, expensive in another
         first, second = chance.sample(objectives, 2)
         constraints += [_ramp(chance, variable, first, 1), _ramp(chance, variable, second, -1)]
     extras = Extras(objectives=objectives)

@@ -1,4 +1,4 @@
-"""Outcomes of runs in the simulator, for tests of what is shown of them."""
+"""Outcomes of runs in the simulator, for tests of pages and reports."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Small random problems with random variables, and their best costs by trying all policies in all scenarios.
 
-The judge uses the declared constraints only: it shares no code with `robochoc.model.uncertainty`.
+Brute force uses the declared constraints only: it shares no code with `robochoc.model.uncertainty`.
 """
 
 from __future__ import annotations

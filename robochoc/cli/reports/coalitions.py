@@ -33,7 +33,7 @@ def print_coalitions(report: CoalitionReport) -> None:
         click.echo(on_one_line(f"  {line}"))
     if not report.is_exact and any(one.excluded_by_messages for one in report.losses):
         tried = counted(report.coins, "seed")
-        note = f"the other robots draw random numbers, tried with {tried}: more may exclude fewer tables (--coins)"
+        note = f"the other robots draw random numbers, tried with {tried}: more seeds may exclude fewer (--coins)"
         click.echo(f"  {note}")
 
 

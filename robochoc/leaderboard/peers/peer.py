@@ -134,7 +134,7 @@ def exported(team: Team, dialect_name: str) -> bytes:
 
 
 def violates(cost: float, forbidden: float) -> bool:
-    """Return whether a cost is that of a forbidden tuple, which is ten times any sum of finite costs, and others."""
+    """Return whether a total cost includes that of a forbidden tuple, which is ten times any sum of finite costs."""
     return abs(cost) > forbidden / 2
 
 

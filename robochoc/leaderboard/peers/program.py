@@ -65,7 +65,7 @@ def run_program(command: Sequence[str], folder: Path, limit_s: float) -> EndedPr
 
 
 def _limit() -> None:
-    """In the new process: limit its files, and let the kernel end it when robochoc is killed (Linux)."""
+    """Limit the files of the new process, and let the kernel end it when robochoc is killed (Linux)."""
     resource.setrlimit(resource.RLIMIT_FSIZE, (LARGEST_FILE, LARGEST_FILE))
     signal.pthread_sigmask(signal.SIG_SETMASK, ())
     signal_when_orphaned(signal.SIGKILL)

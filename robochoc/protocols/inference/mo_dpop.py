@@ -12,7 +12,7 @@ From the root down, each robot then chooses a value for each point of the front.
   needs more ends; `bases`, the number system of packed vectors, set by the run.
 - **Reference**: the principle is that of Rollón: "Multi-objective optimization in graphical models", PhD thesis,
   2008 (bucket elimination on vectors), and of Matsui, Silaghi, Hirayama, Yokoo, Matsuo: "Distributed search method with
-  bounded cost vectors on multiple objective DCOPs", PRIMA 2012. Their texts were not at hand: this is built from the
+  bounded cost vectors on multiple objective DCOPs", PRIMA 2012. Their texts were not available: this is built from the
   principle.
 
 Choices:

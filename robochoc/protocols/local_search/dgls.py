@@ -2,7 +2,7 @@
 
 GDBA with three changes. A constraint is violated with a probability that grows with its cost, so expensive constraints
 are penalised more often. Penalties evaporate: in each cycle they are multiplied by `gamma`. And penalties are the same
-on both sides of a constraint: a robot tells its neighbours in the next cycle which constraints it has penalised.
+on both sides of a constraint: with its next value, a robot sends its neighbours the constraints that it has penalised.
 
 - **When to use**: costs, a large team, time for many cycles: like GDBA, also if each pair of values has its own cost.
 - **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The result is the best

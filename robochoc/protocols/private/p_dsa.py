@@ -5,7 +5,7 @@ and moves to it with a probability if this lowers its cost. But after the first 
 even its own: all robots have shares of the codes of all values, and of all tables of costs, and compute the next codes
 together. Nothing is opened until the end, when each robot receives its value in the best cycle.
 
-- **When to use**: costs, three robots or more that may put together what they know, and too many for `pc-syncbb`.
+- **When to use**: costs, three robots or more that may combine their knowledge, and too many for `pc-syncbb`.
 - **Guarantees**: incomplete; it stops after `cycles` cycles with the best of them, without a proof. Robots are assumed
   to follow the protocol (honest but curious), and to have channels that nobody else reads. A coalition of fewer than
   half of the robots learns nothing but its own values at the end.

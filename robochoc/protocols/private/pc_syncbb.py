@@ -6,7 +6,7 @@ every robot before it. From these the robots compute shares of the new path's co
 which no robot knows either. Only the answer is opened: whether the path costs less than the best one. Then the next
 robot, or the next value, has its turn. At the end each robot takes its value in the best path.
 
-- **When to use**: costs, three robots or more, and robots that may put together what they know.
+- **When to use**: costs, and three robots or more that may combine their knowledge.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. Robots are assumed
   to follow the protocol (honest but curious), and to have channels that nobody else reads. A coalition of fewer than
   half of the robots learns nothing but the answers of comparisons and its own values in the best path.
@@ -150,7 +150,7 @@ class PCSyncBB(SharedCostsProtocol):
     # The search: the same steps for all robots
 
     def _visit_next(self) -> None:
-        """The last robot on the path tries its next value; if there is none, the robot before it does."""
+        """Let the last robot on the path that has a value left try it; without such a robot, finish."""
         while self.attempts and self.attempts[-1] == self.sizes[len(self.attempts) - 1]:
             self.attempts.pop()
         if not self.attempts:

@@ -1,4 +1,4 @@
-"""Several objectives in files and in models: what is read is what was written, and mistakes are named."""
+"""Several objectives in files and in models: files are read as they were written, and errors are reported."""
 
 from __future__ import annotations
 

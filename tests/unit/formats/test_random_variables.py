@@ -1,4 +1,4 @@
-"""Random variables in files: what is read, what is written, and what is refused, with its line."""
+"""Random variables in files: reading, writing, and errors with their lines."""
 
 from __future__ import annotations
 

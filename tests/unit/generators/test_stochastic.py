@@ -1,4 +1,4 @@
-"""Random problems with random variables: their numbers, and that a seed is one problem."""
+"""Random problems with random variables: numbers of parts, and equal problems for equal seeds."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tests.support.examples import drawn
 
 
 def test_a_seed_is_one_problem_everywhere() -> None:
-    """Fixed for good: who publishes figures names seeds."""
+    """The digest never changes, since published figures name seeds."""
     team = stochastic(agents=5, domain=3, observed=0.5, seed=1)
     assert (team.name, digest(team)) == ("stochastic-5-3-0.4-2x2-2-0.5-10-1", "6d69a32c1d49992e")
 

@@ -36,7 +36,7 @@ ANSWER = {"status": "FINISHED", "assignment": OPTIMUM, "cost": 399, "msg_count":
 
 
 def program(folder: Path, text: str) -> Path:
-    """Write a program that stands for the Python of a tool: it prints a version, or does what `text` says."""
+    """Write a program that stands for the Python of a tool: it prints a version, or executes `text`."""
     path = folder / "python"
     path.write_text(f'#!/bin/sh\ncase "$*" in *--version) echo pydcop 0.1.2a1; exit;; esac\n{text}\n')
     path.chmod(0o755)

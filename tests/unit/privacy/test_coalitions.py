@@ -183,7 +183,7 @@ def test_every_protocol_is_measured_or_refused_in_one_sentence() -> None:
 
 def test_what_cannot_be_measured_is_refused() -> None:
     for size, protocol, why in (
-        (3, "dpop", "a coalition of 3 of 3 robots has nobody"),
+        (3, "dpop", "a coalition of 3 robots leaves none of 3"),
         (2, "pc-syncbb", "fewer than half of the 3 robots"),
         (1, "p-dpop", "draws secret keys"),
     ):
