@@ -27,6 +27,7 @@ from robochoc.app.sketch.files import MAX_SKETCH, zipped
 from robochoc.app.sketch.open_from_disk import bounded_archive
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.store import FILES
+from robochoc.system.archives import DAMAGED
 
 MAX_BYTES = 256 << 20
 """The maximum number of bytes of an unpacked run."""

@@ -119,13 +119,14 @@ def test_a_robot_that_joins_declares_the_same_random_variables(tmp_path: Path) -
     )
     late = folder / "late" / "Extra.xml"
     late.parent.mkdir()
-    extra = re.sub("<agents_neighbours>.*</agents_neighbours>", "<agents_neighbours/>", (GUSTS / "Relay.xml").read_text(), flags=re.DOTALL)
+    extra = (GUSTS / "Relay.xml").read_text()
+    extra = re.sub("<agents_neighbours>.*</agents_neighbours>", "<agents_neighbours/>", extra, flags=re.DOTALL)
     extra = extra.replace("relay", "extra").replace('seen_by="extra"', 'seen_by="relay"')
     late.write_text(extra)
     assert [epoch.verdict for epoch in solve(read_team(folder), SIMULATED).epochs] == ["optimal", "optimal"]
     late.write_text(extra.replace("0.7:0|0.3:3", "0.6:0|0.4:3"))
     with pytest.raises(
-        InvalidInputError, match="Extra.xml:11: the random variable 'wind' differs from that of the team"
+        InvalidInputError, match=r"Extra\.xml:11: the random variable 'wind' differs from that of the team"
     ):
         read_team(folder)
 
