@@ -17,6 +17,15 @@ RULED_OUT = "has ruled everything out"
 """The reason why a single robot can conclude `no-solution`. It covers every protocol: the robot has derived the empty
 nogood, tried all values, or used bounds.
 """
+BEST_FOR_SAMPLES = "it is the best for the samples, and not proven to be the best in expectation"
+"""The reason why the verdict is `SOLUTION` although the search has found an optimum of a problem with samples."""
+
+
+class Approximation(StrEnum):
+    """The part of a problem that was searched: grids of its real variables, or samples of its random variables."""
+
+    GRIDS = "grids"
+    SAMPLES = "samples"
 
 
 class Verdict(StrEnum):

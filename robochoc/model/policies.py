@@ -29,16 +29,39 @@ class Choice:
 
 
 @dataclass(frozen=True)
+class SampledCost:
+    """The cost of a policy that is the best for samples, and an interval for its expected cost.
+
+    Attributes:
+        samples: The number of samples with which the search replaced expectations.
+        cost: The average cost for these samples, which was optimised.
+        fresh: The number of further samples, independent of the search, on which the interval is based. 0: there is no
+            interval, since the expected cost is known exactly, or its range is not.
+        low: The lower end of the 95 % confidence interval of the expected cost.
+        high: Its upper end.
+        method: The inequality from which the interval follows: `empirical Bernstein`.
+    """
+
+    samples: int
+    cost: Cost
+    fresh: int = 0
+    low: Cost | None = None
+    high: Cost | None = None
+    method: str | None = None
+
+
+@dataclass(frozen=True)
 class PolicyReport:
     """An answer to a problem with random variables. Costs are in the user's units.
 
     Attributes:
         risk: The cost that was optimised.
-        expected: The expected cost, or utility. None: robots have withdrawn.
+        expected: The expected cost, or utility. None: robots have withdrawn, or there are too many outcomes.
         worst: The cost in the worst scenario. None: robots have withdrawn, or there are too many scenarios.
         worst_scenario: The outcomes in a worst scenario; random variables that have no effect on costs are left out.
         scenarios: The number of joint outcomes of all random variables.
         policies: The choices of each variable whose value is chosen after an observation.
+        sampled: The cost for samples, if they replaced expectations.
     """
 
     risk: Risk
@@ -47,3 +70,4 @@ class PolicyReport:
     worst_scenario: dict[str, int]
     scenarios: int
     policies: dict[str, tuple[Choice, ...]]
+    sampled: SampledCost | None = None

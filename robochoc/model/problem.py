@@ -154,6 +154,7 @@ class Robot:
         objectives: The names of the team's objectives, if there are several (`model/objectives.py`).
         random: The random variables in the robot's file.
         declared: The robot as in its file, if this robot is its deterministic equivalent (`model/uncertainty.py`).
+        sampled: True if its costs are averages over samples of random variables, instead of expectations.
     """
 
     name: str
@@ -172,6 +173,7 @@ class Robot:
     objectives: tuple[str, ...] = ()
     random: tuple[RandomVariable, ...] = ()
     declared: Robot | None = field(default=None, compare=False, repr=False)
+    sampled: bool = field(default=False, compare=False, repr=False)
 
     def constraints(self) -> Iterator[Constraint]:
         """Yield every constraint in the robot's file: private and shared ones, and parts of partially known ones."""

@@ -2,8 +2,9 @@
 
 A decision variable whose value is chosen after an observation becomes one variable for each outcome of the observed
 random variables: together they are the policy. The expectation of a sum is the sum of the expectations, so that each
-constraint is replaced by itself in every outcome on which it depends, with its cost multiplied by the probability.
-Each robot does this alone, from its own file. The result is an ordinary team, for all protocols.
+constraint is replaced by itself in every outcome on which it depends, with its cost multiplied by the probability. If
+there are too many outcomes, samples replace those that no decision variable of the constraint observes. Each robot does
+this alone, from its own file. The result is an ordinary team, for all protocols.
 
 Source: Leaute and Faltings, Distributed constraint optimization under stochastic uncertainty, AAAI 2011.
 """
@@ -18,17 +19,18 @@ from dataclasses import replace
 from robochoc.model.constraint import INFINITE, Constraint, Function, Predicate, Relation, Semantics, Term, Variable
 from robochoc.model.cost_units import MAX_PLACES
 from robochoc.model.expression import Apply, Constant, names
-from robochoc.model.finer_units import robot_in_places
+from robochoc.model.finer_units import robot_in_places, team_in_places
 from robochoc.model.magnitudes import MAX_COST
 from robochoc.model.problem import Robot, Team, Topic
 from robochoc.model.random_variable import RandomVariable
+from robochoc.model.sampling import MAX_OUTCOMES, Law, Samples, can_be_infinite, exact_law, joint_outcomes, sampled_law
 from robochoc.system.errors import RobochocError
 from robochoc.system.plain_text import counted
 
-MAX_OUTCOMES = 4096
-"""The maximum number of joint outcomes on which a constraint or a variable depends."""
 MAX_PARTS = 2_000_000
 """The maximum number of variables, constraints and costs in a robot's deterministic equivalent."""
+AUTOMATIC = Samples()
+"""The samples that are used where an expectation over all outcomes is too large."""
 _MOST_NAMES = 10
 
 Scenario = Mapping[str, int]
@@ -76,9 +78,7 @@ class Outcomes:
 
     def scenarios(self, randoms: Sequence[RandomVariable]) -> Iterator[tuple[int, Scenario]]:
         """Yield the joint outcomes of `randoms`, each with the product of the weights."""
-        for chosen in itertools.product(*(zip(one.outcomes, one.weights, strict=True) for one in randoms)):
-            weight = math.prod(weight for _, weight in chosen)
-            yield weight, {one.name: outcome for one, (outcome, _) in zip(randoms, chosen, strict=True)}
+        yield from joint_outcomes(randoms)
 
     def term(self, term: Term, scenario: Scenario) -> Term:
         """Return the value of a random variable, or the variable that decides for `scenario`."""
@@ -101,7 +101,29 @@ class Outcomes:
         )
 
 
-def expected_robot(robot: Robot) -> Robot:
+def law_of(constraint: Constraint, outcomes: Outcomes, samples: Samples, places: int) -> Law:
+    """Return the joint outcomes over which the cost of a constraint is averaged.
+
+    Args:
+        constraint: The constraint.
+        outcomes: The random variables of its robot.
+        samples: The samples to use if there are too many joint outcomes for an exact expectation. Outcomes that
+            variables of the constraint observe are not sampled, since a policy has a value for each of them.
+        places: The decimal places of the unit of costs.
+    """
+    randoms = outcomes.on_which(constraint.scope)
+    law = exact_law(randoms)
+    if not constraint.has_costs:
+        return law
+    seen = {one.name for term in constraint.variables for one in outcomes.seen(term)}
+    hidden = [one for one in randoms if one.name not in seen]
+    number = math.prod(len(one.outcomes) for one in hidden)
+    if number <= samples.exact and (number == 1 or _places_of(constraint, places, law) <= MAX_PLACES):
+        return law
+    return sampled_law([one for one in randoms if one.name in seen], hidden, samples)
+
+
+def expected_robot(robot: Robot, samples: Samples = AUTOMATIC) -> Robot:
     """Return the deterministic equivalent of `robot`, whose costs are expected costs.
 
     The result has the original in `Robot.declared`. A robot without random variables is returned unchanged.
@@ -111,7 +133,22 @@ def expected_robot(robot: Robot) -> Robot:
     """
     if not robot.random or robot.declared is not None:
         return robot
-    return _Expectation(robot).robot()
+    return _Expectation(robot, samples).robot()
+
+
+def sampled_team(team: Team, samples: Samples) -> Team:
+    """Return the equivalent of a problem with random variables in which the averages of `samples` replace expectations.
+
+    Args:
+        team: Any equivalent of the problem.
+        samples: The samples, for constraints that depend on too many joint outcomes.
+
+    Raises:
+        UncertaintyError: see `expected_robot`.
+    """
+    robots = [robot if robot.declared is None else expected_robot(robot.declared, samples) for robot in team.robots]
+    places = max(robot.costs.places for robot in robots)
+    return replace(team_in_places(team, places), robots=tuple(robot_in_places(robot, places) for robot in robots))
 
 
 def is_uncertain(team: Team) -> bool:
@@ -148,15 +185,18 @@ def random_variables(team: Team) -> tuple[RandomVariable, ...]:
 class _Expectation:
     """Computes the deterministic equivalent of a robot, in the coarsest unit of costs that is exact."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, samples: Samples = AUTOMATIC) -> None:
         self._outcomes = Outcomes(robot.random)
+        self._samples = samples
+        own = robot.costs.places
         copies = (copy for child in robot.children for copy in child.copies)
-        needed = (self._places_of(one, robot.costs.places) for one in (*robot.constraints(), *copies))
-        places = max([robot.costs.places, *needed])
+        laws = [(one, self._law(one, own)) for one in (*robot.constraints(), *copies)]
+        self._is_sampled = any(law.drawn for _, law in laws)
+        places = max([own, *(_places_of(one, own, law) for one, law in laws)])
         if places > MAX_PLACES:
             raise UncertaintyError(
                 f"the expected costs have {places} decimal places",
-                f"use probabilities and costs with fewer digits: at most {MAX_PLACES} places in all",
+                f"use probabilities and costs with fewer digits (at most {MAX_PLACES} places in all), or fewer samples",
             )
         self._declared = robot_in_places(robot, places)
         self._parts = 0
@@ -181,25 +221,17 @@ class _Expectation:
             topics=tuple(map(self._topic, robot.topics)),
             shown=self._decisions(robot.shown),
             declared=robot,
+            sampled=self._is_sampled,
         )
 
     def constraints(self, constraints: Iterable[Constraint]) -> tuple[Constraint, ...]:
         return tuple(part for one in constraints for part in self._in_all_outcomes(one))
 
-    def _places_of(self, constraint: Constraint, places: int) -> int:
-        """Return the decimal places of the expected costs of a constraint whose costs have `places` decimal places."""
-        randoms = self._outcomes.on_which(constraint.scope)
-        match constraint.definition:
-            case Predicate():
-                amounts: Iterable[float] = (constraint.cost,)
-            case Relation(costs=costs, default_cost=default):
-                amounts = (*costs, default)
-            case Function(places=own):
-                places, amounts = own, (1,)
-        amount = math.gcd(*(int(one) for one in amounts if one != INFINITE))
-        amount *= math.prod(math.gcd(*one.weights) for one in randoms)
-        places += sum(one.places for one in randoms)
-        return places - _final_zeros(amount, places) if amount else 0
+    def _law(self, constraint: Constraint, places: int) -> Law:
+        law = law_of(constraint, self._outcomes, self._samples, places)
+        if not constraint.has_costs or (law.drawn and can_be_infinite(constraint)):
+            _check_number([*law.observed, *law.drawn], f"the constraint {constraint.name}", constraint.line)
+        return law
 
     def _variables(self, variable: Variable) -> Iterator[Variable]:
         self._count(_check_number(self._outcomes.seen(variable.name), f"the variable {variable.name}"))
@@ -219,11 +251,11 @@ class _Expectation:
         return topic
 
     def _in_all_outcomes(self, constraint: Constraint) -> Iterator[Constraint]:
-        randoms = self._outcomes.on_which(constraint.scope)
-        self._count(_check_number(randoms, f"the constraint {constraint.name}", constraint.line))
-        places = sum(one.places for one in randoms)
-        for weight, scenario in self._outcomes.scenarios(randoms):
-            yield self._weighted(self._outcomes.in_scenario(constraint, scenario), weight, places)
+        law = self._law(constraint, self._declared.costs.places)
+        self._count(law.number)
+        undrawn = law.undrawn() if can_be_infinite(constraint) else ()
+        for weight, scenario in itertools.chain(law.cases(), undrawn):
+            yield self._weighted(self._outcomes.in_scenario(constraint, scenario), weight, law.places)
 
     def _weighted(self, constraint: Constraint, weight: int, places: int) -> Constraint:
         """Return `constraint` with its cost multiplied by a probability: `weight`, in units of 10^-`places`."""
@@ -238,6 +270,10 @@ class _Expectation:
                     default = _expected(constraint, relation.default_cost, weight, places)
                     self._scaled[key] = relation, replace(relation, costs=costs, default_cost=default)
                 return replace(constraint, definition=self._scaled[key][1])
+            case Function() as function if not weight:  # it must be defined, and costs nothing
+                is_defined = Apply("eq", (function.body, function.body))
+                rule = Predicate(function.name, function.parameters, is_defined, function.symbolic, function.real)
+                return replace(constraint, definition=rule)
             case Function() as function:
                 zeros = _final_zeros(weight, places)
                 key = id(function), weight, places
@@ -256,6 +292,20 @@ class _Expectation:
                 f"the variables, constraints and costs in all outcomes are more than {MAX_PARTS:,}",
                 "use fewer outcomes, smaller relations, or fewer variables in seen_by",
             )
+
+
+def _places_of(constraint: Constraint, places: int, law: Law) -> int:
+    """Return the decimal places of the average costs of a constraint whose costs have `places` decimal places."""
+    match constraint.definition:
+        case Predicate():
+            amounts: Iterable[float] = (constraint.cost,)
+        case Relation(costs=costs, default_cost=default):
+            amounts = (*costs, default)
+        case Function(places=own):
+            places, amounts = own, (1,)
+    amount = math.gcd(*(int(one) for one in amounts if one != INFINITE)) * law.factor
+    places += law.places
+    return places - _final_zeros(amount, places) if amount else 0
 
 
 def _expected(constraint: Constraint, cost: float, weight: int, places: int) -> float:
@@ -285,7 +335,7 @@ def _check_number(randoms: Sequence[RandomVariable], what: str, line: int = 0) -
     if number > MAX_OUTCOMES:
         raise UncertaintyError(
             f"{what} depends on {counted(number, 'joint outcome')} of {named(randoms)}",
-            f"use at most {MAX_OUTCOMES:,}: fewer outcomes, or fewer random variables in one constraint",
+            f"use at most {MAX_OUTCOMES:,}: fewer outcomes, or fewer random variables; only finite costs are sampled",
             line,
         )
     return number

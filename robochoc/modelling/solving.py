@@ -95,6 +95,7 @@ class Solvable(ABC):
         answer: str = AnswerRule.BEST,
         repair: bool = True,
         risk: str = Risk.EXPECTED,
+        samples: int | None = None,
         objectives: str | None = None,
         refine: float | None = None,
         cluster: str | None = None,
@@ -159,6 +160,8 @@ class Solvable(ABC):
             repair: True if a local search repairs the assignment of an incomplete protocol that has ended with violated
                 hard constraints, unless the answer is `final` or there are limits other than on time.
             risk: The minimised cost of a problem with random variables: `expected`, or `worst` of all scenarios.
+            samples: The number of samples that replace an expectation over more joint outcomes of random variables.
+                None: 1,000 samples for more than 4,096 outcomes.
             objectives: The treatment of several objectives: `weighted:NAME=WEIGHT,...`, `lexicographic:NAME,...` or
                 `pareto`. None: `pareto`, if there are several.
             refine: The step of the finest grids of real variables, in their unit. None: their precision; infinite: the

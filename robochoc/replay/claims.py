@@ -20,7 +20,7 @@ from robochoc.journal.entries import STAMPED_LATE
 from robochoc.journal.events import AnyEvent, Decided, Lost, Received, Sent, Settled
 from robochoc.journal.journal import Header, Journal, metrics_of
 from robochoc.model.costs import user_cost
-from robochoc.model.outcome import Answer, Metrics, Outcome, Verdict
+from robochoc.model.outcome import BEST_FOR_SAMPLES, Answer, Metrics, Outcome, Verdict
 from robochoc.model.problem import Team
 from robochoc.protocols.satisfaction.disac import DisAC
 from robochoc.replay.rebuild import RebuiltRobots
@@ -211,8 +211,9 @@ def _answer_contradictions(whose: str, recorded: Answer, last: ReplayedRun) -> I
     if recorded.verdict != Verdict.NO_SOLUTION and (earlier or decided):
         yield from _published_contradictions(whose, recorded, replayed, last.team)
         return
+    proves_less = last.limited or recorded.reason == BEST_FOR_SAMPLES
     is_proven_later = (recorded.verdict, replayed.verdict) == (Verdict.SOLUTION, Verdict.OPTIMAL)
-    names = ("assignment", "cost") if last.limited and is_proven_later else ("verdict", "assignment", "cost")
+    names = ("assignment", "cost") if proves_less and is_proven_later else ("verdict", "assignment", "cost")
     yield from _differing(whose, recorded, replayed, names)
     left, right = sorted(recorded.withdrawn), sorted(replayed.withdrawn)
     if left != right:

@@ -62,7 +62,7 @@ def solve_centrally(team: Team, context: RunContext, header: Outcome) -> Outcome
 
 
 def _shown(answer: PhaseAnswer, team: Team, context: RunContext) -> PhaseAnswer:
-    return answer.on_grid() if context.is_on_grid(team) else answer
+    return answer.for_whole_problem(context.searched(team))
 
 
 def _opened_by(team: Team, number: int) -> str:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from robochoc.communication.kill_schedule import KillSchedule
 from robochoc.communication.search_result import Progress
 from robochoc.journal.events import Observer
+from robochoc.model.outcome import Approximation
 from robochoc.model.problem import Team
 from robochoc.model.symbols import real_places
 from robochoc.run.options import CentralSolverName, Options
@@ -60,9 +61,11 @@ class RunContext:
         limit_s = self.options.limit_s
         self.deadline = None if limit_s is None else self.began + limit_s
 
-    def is_on_grid(self, team: Team) -> bool:
-        """Return whether answers hold only on grids of real variables, and nobody proves more."""
-        return not self.proves_reals and bool(real_places(team))
+    def searched(self, team: Team) -> Approximation | None:
+        """Return the part of the problem that is searched, unless the caller proves more. None: the whole problem."""
+        if real_places(team) and not self.proves_reals:
+            return Approximation.GRIDS
+        return Approximation.SAMPLES if any(robot.sampled for robot in team.robots) else None
 
     def left_s(self) -> float | None:
         """Return the remaining seconds; None if there is no limit."""

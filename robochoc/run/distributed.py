@@ -13,7 +13,7 @@ from dataclasses import replace
 
 from robochoc.communication.search_result import RobotsLostError, SearchResult
 from robochoc.model.cost_units import Cost
-from robochoc.model.outcome import Metrics, Outcome, SearchStage, Verdict, Violations
+from robochoc.model.outcome import Approximation, Metrics, Outcome, SearchStage, Verdict, Violations
 from robochoc.model.problem import ProblemKind
 from robochoc.protocols.protocol import Protocol
 from robochoc.run.evaluation import PhaseAnswer, Search, evaluate_search, why_spoiled
@@ -70,8 +70,8 @@ class Deployment(ABC):
 
     @property
     @abstractmethod
-    def is_on_grid(self) -> bool:
-        """Return whether the answer holds only on grids of real variables."""
+    def searched(self) -> Approximation | None:
+        """Return the part of the problem that is searched. None: the whole problem."""
 
     @abstractmethod
     def withdrawal_cost(self) -> float:
@@ -215,7 +215,7 @@ class Deployment(ABC):
         """Return `header`, which describes the run, completed by `answer`."""
         metrics = replace(answer.metrics, compile_s=self.compile_s)
         answer = replace(answer, metrics=metrics, count=self._count(answer))
-        return (answer.on_grid() if self.is_on_grid else answer).as_outcome(header, self.lost)
+        return answer.for_whole_problem(self.searched).as_outcome(header, self.lost)
 
     def _count(self, answer: PhaseAnswer) -> int | None:
         """Return the number of solutions or optima if the options require it and the number is known."""

@@ -13,7 +13,18 @@ from typing import NamedTuple
 from robochoc.communication.search_result import SearchResult
 from robochoc.model.cost_units import Cost
 from robochoc.model.costs import user_cost
-from robochoc.model.outcome import Answer, EpochOutcome, FrontPoint, Metrics, Optima, Outcome, Verdict, Violations
+from robochoc.model.outcome import (
+    BEST_FOR_SAMPLES,
+    Answer,
+    Approximation,
+    EpochOutcome,
+    FrontPoint,
+    Metrics,
+    Optima,
+    Outcome,
+    Verdict,
+    Violations,
+)
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.model.team_edits import dropped_constraints
 from robochoc.run.incumbent import best_known, least_violating, lower_bound, merged_values, optima, pseudo_tree
@@ -103,13 +114,18 @@ class PhaseAnswer(Answer):
             return replace(found, verdict=Verdict.OPTIMAL, bound=None)
         return found
 
-    def on_grid(self) -> PhaseAnswer:
-        """Return this answer without proofs: it holds on grids of real variables, and not for other real numbers."""
+    def for_whole_problem(self, searched: Approximation | None) -> PhaseAnswer:
+        """Return this answer without proofs that hold only for the part of the problem that was `searched`."""
+        if searched is None:
+            return self
         bare = replace(self, bound=None, confirmed=False, confirmed_by=())
         match self.verdict:
             case Verdict.OPTIMAL:
                 found = [one._replace(verdict=Verdict.SOLUTION) for one in self.improvements]
-                return replace(bare, verdict=Verdict.SOLUTION, improvements=tuple(found))
+                bare = replace(bare, verdict=Verdict.SOLUTION, improvements=tuple(found))
+                return bare if searched == Approximation.GRIDS else replace(bare, reason=BEST_FOR_SAMPLES, count=None)
+            case Verdict.NO_SOLUTION if searched == Approximation.SAMPLES:
+                return self  # hard constraints are not sampled
             case Verdict.NO_SOLUTION:
                 return replace(bare, verdict=Verdict.UNKNOWN, witness=None, verified=False, reason=NOT_ON_GRIDS)
             case _:

@@ -82,6 +82,16 @@ def count(name: str, value: object) -> int:
     return number
 
 
+def samples(name: str, value: object) -> int:
+    """Convert a number of samples."""
+    from robochoc.model.sampling import sample_number  # noqa: PLC0415 - start-up: rarely needed
+
+    try:
+        return sample_number(integer(name, value))
+    except ValueError as invalid:
+        raise OptionError(f"{name}: {invalid}") from None
+
+
 def real(name: str, value: object, expected: str = "a number") -> float:
     """Convert a real number of any type."""
     if not isinstance(value, Real):

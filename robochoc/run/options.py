@@ -26,6 +26,7 @@ from robochoc.run.option_values import (
     priority_order,
     protocol_name,
     real,
+    samples,
     seconds,
     start_values,
     text,
@@ -180,6 +181,8 @@ class Options:
             of the files are not refined).
         risk: The optimised cost of a problem with random variables.
         bounds: True if events report lower bounds of the cost that robots have proven (processes and simulator).
+        samples: The number of samples that replace an expectation over more joint outcomes of random variables (None:
+            as in the files, 1,000 for more than 4,096 outcomes).
         objectives: The treatment of several objectives: an `ObjectivesMode`, or its text. None: `pareto`, if the
             protocol is chosen or finds fronts.
     """
@@ -222,6 +225,7 @@ class Options:
     stages: tuple[Stage, ...] = ()
     refine: float | None = None
     risk: Risk = Risk.EXPECTED
+    samples: int | None = None
     objectives: ObjectivesMode | None = None
 
     def __post_init__(self) -> None:
@@ -305,6 +309,7 @@ _CONVERTERS = MappingProxyType(
         "cold": flag,
         "refine": optional(real),
         "risk": one_of(Risk),
+        "samples": optional(samples),
         "objectives": optional(objectives),
         "stages": items_of(instance_of(Stage), "objects of the class Stage"),
     }

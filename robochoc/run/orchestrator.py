@@ -17,8 +17,9 @@ from robochoc.model.orders import OrderError
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.policies import Risk
 from robochoc.model.problem import Team
+from robochoc.model.sampling import Samples
 from robochoc.model.symbols import real_places, symbol_table, symbolic_variables
-from robochoc.model.uncertainty import UncertaintyError, is_uncertain
+from robochoc.model.uncertainty import AUTOMATIC, UncertaintyError, is_uncertain, sampled_team
 from robochoc.model.worst_case import worst_case
 from robochoc.run.choice import ProtocolChoice, choose, choose_without_analysis
 from robochoc.run.compatibility.option_rules import refuse_options
@@ -97,6 +98,7 @@ class PreparedRun:
         choice: The options with a protocol and an order, and the reasons for them.
         spent_s: The seconds spent on the choice. They count towards the time of the run.
         uncertain: The team with expected costs, if the problem has random variables.
+        samples: The samples of random variables that replace some of the expected costs of `team`.
         combined: The team with several objectives, if `team` is its form with a single cost.
     """
 
@@ -104,6 +106,7 @@ class PreparedRun:
     choice: ProtocolChoice
     spent_s: float
     uncertain: Team | None = None
+    samples: Samples = AUTOMATIC
     combined: CombinedRun | None = None
 
     def solve(
@@ -132,7 +135,8 @@ class PreparedRun:
         if self.uncertain and outcome.assignment and not outcome.epochs:
             from robochoc.verification.policies import policy_report  # noqa: PLC0415 - start-up: rarely needed
 
-            return replace(outcome, uncertainty=policy_report(self.uncertain, outcome, self.choice.options.risk))
+            report = policy_report(self.uncertain, outcome, self.choice.options.risk, self.samples)
+            return replace(outcome, uncertainty=report)
         return outcome if self.combined is None else self.combined.outcome(outcome)
 
 
@@ -160,6 +164,10 @@ def prepare(team: Team, options: Options, *, environment: bool = False, ordered:
         ):  # a table ends with any of its robots
             what = "robots cannot withdraw, be lost or leave during a run"
             raise UnsupportedError(f"with --risk worst, {what}: use --risk expected")
+    samples = AUTOMATIC
+    if options.samples is not None:
+        samples = Samples(options.samples, options.seed, options.samples)
+        team = _sampled(team, samples, environment=environment)
     run = None
     if team.objectives or options.objectives is not None:
         from robochoc.run.objectives import combined_run  # noqa: PLC0415 - start-up: rarely needed
@@ -172,7 +180,7 @@ def prepare(team: Team, options: Options, *, environment: bool = False, ordered:
         choice = computed_by(deadline, choose, team, options, environment=environment, ordered=ordered)
     except TimeLimitError:
         choice = choose_without_analysis(team, options)
-    return PreparedRun(team, choice, time.monotonic() - began, uncertain, run)
+    return PreparedRun(team, choice, time.monotonic() - began, uncertain, samples, run)
 
 
 def _worst_case(team: Team) -> Team:
@@ -183,6 +191,17 @@ def _worst_case(team: Team) -> Team:
         raise UnsupportedError(f"{team.name} {what}, so that the worst case cannot be minimised: use --risk expected")
     try:
         return worst_case(team)
+    except UncertaintyError as refused:
+        raise UnsupportedError(str(refused)) from None
+
+
+def _sampled(team: Team, samples: Samples, *, environment: bool) -> Team:
+    """Return the team whose costs are averages of samples. Raises `UnsupportedError`."""
+    if not is_uncertain(team) or environment:
+        what = "is changed during the run" if is_uncertain(team) else "has no random variables"
+        raise UnsupportedError(f"{team.name} {what}, so that --samples cannot be used: remove --samples")
+    try:
+        return sampled_team(team, samples)
     except UncertaintyError as refused:
         raise UnsupportedError(str(refused)) from None
 

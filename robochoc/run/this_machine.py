@@ -14,7 +14,7 @@ from robochoc.journal.team_events import TeamWriter, start_fields
 from robochoc.model.cost_units import Cost
 from robochoc.model.costs import normalized_event, user_cost
 from robochoc.model.orders import Order, compute_order, with_dom_deg_order
-from robochoc.model.outcome import EpochOutcome, Improvement, Metrics, Preprocessing, Verdict
+from robochoc.model.outcome import Approximation, EpochOutcome, Improvement, Metrics, Preprocessing, Verdict
 from robochoc.model.problem import INFINITE, ProblemKind, Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.requirements import unmet_requirement
@@ -145,9 +145,9 @@ class ThisMachine(Deployment):
         return tuple(self._scenario.lost_for_good)
 
     @property
-    def is_on_grid(self) -> bool:
-        """See `Deployment.is_on_grid`."""
-        return self._context.is_on_grid(self._team)
+    def searched(self) -> Approximation | None:
+        """See `Deployment.searched`."""
+        return self._context.searched(self._team)
 
     @property
     def is_empty(self) -> bool:
@@ -295,7 +295,7 @@ class ThisMachine(Deployment):
             start_epoch = partial(self._start_epoch, phase, session)
             for epoch in scenario.epochs(session, start_epoch, phase.parameters):
                 answer, lost = self._answer_of(phase, epoch), epoch.result.lost
-                shown = answer.on_grid() if self.is_on_grid else answer
+                shown = answer.for_whole_problem(self.searched)
                 self.epochs.append(shown.as_epoch(epoch.team.order, epoch.opened_by, tuple(lost)))
                 if self._dynamic or lost:
                     self._restart()
@@ -363,8 +363,7 @@ class ThisMachine(Deployment):
 
         def publish(answer: PhaseAnswer, improvements: tuple[Improvement, ...]) -> None:
             if audience is not None:
-                now = replace(answer, improvements=improvements)
-                now = now.on_grid() if self.is_on_grid else now
+                now = replace(answer, improvements=improvements).for_whole_problem(self.searched)
                 audience.improve(team, now.as_epoch(team.order, start.opened_by or "the start"), answer.withdrawn)
 
         session.watch = self._improvements = improvements_of(

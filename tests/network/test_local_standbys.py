@@ -68,11 +68,12 @@ GIVEN: dict[str, object] = {
     "cold": True,
     "stages": (),
     "risk": Risk.WORST,
+    "samples": 100,
     "objectives": "pareto",
     "refine": 0.1,
 }
 """A value of each option that differs from the default, where there is one."""
-USED_BY_THE_PARENT = {"local", "cache", "order", "kill", "standby", "chosen", "risk", "objectives", "refine"}
+USED_BY_THE_PARENT = {"local", "cache", "order", "kill", "standby", "chosen", "risk", "samples", "objectives", "refine"}
 WITHOUT_EFFECT = {"cold", "stages"}
 """Options for teams with a scenario and for stages, which do not exist on a network."""
 

@@ -9,6 +9,7 @@ import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from math import prod
 from random import Random
 
 from robochoc.model.assembly import Extras, assemble
@@ -27,6 +28,7 @@ from robochoc.model.cost_units import CostUnits
 from robochoc.model.expression import Apply, Constant, Name
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.model.random_variable import RandomVariable
+from robochoc.model.sampling import Samples
 
 Judged = tuple[Fraction | None, Fraction | None]
 WEIGHTS: dict[int, list[tuple[int, ...]]] = {1: [(1,)], 2: [(5, 5), (3, 7), (9, 1)], 3: [(2, 3, 5), (1, 1, 8)]}
@@ -57,6 +59,41 @@ class UncertainProblem:
             return None, None
         return aim(one for one, _ in found), aim(one for _, one in found)
 
+    def best_for(self, samples: Samples) -> Fraction | None:
+        """Return the best cost for `samples` over all policies; None: there is no policy."""
+        aim: Callable[..., Fraction] = max if self.units.maximize else min
+        found = [self._average(policy, samples) for policy in self._policies()]
+        return aim((one for one in found if one is not None), default=None)
+
+    def _average(self, policy: Mapping[str, Mapping[tuple[int, ...], int]], samples: Samples) -> Fraction | None:
+        unit = 10**self.units.places
+        total = Fraction(self.units.constant, unit)
+        if any(self._cost(policy, case) is None for _, case in self._scenarios()):
+            return None
+        for constraint in self.constraints:
+            scope = set(constraint.variables)
+            seen = {one.name for one in self.random if scope & {*one.seen_by}}
+            hidden = [one for one in self.random if one.name in scope - seen]
+            number = prod(len(one.outcomes) for one in hidden)
+            if number <= samples.exact:
+                cases = list(self._scenarios())
+            else:
+                draws = list(zip(*(samples.draws(one) for one in hidden), strict=True))
+                names = [one.name for one in hidden]
+                cases = [
+                    (chance / probability(hidden, case) / len(draws), case | dict(zip(names, row, strict=True)))
+                    for chance, case in self._scenarios()
+                    if all(case[one.name] == one.outcomes[0] for one in hidden)
+                    for row in draws
+                ]
+            factor = Fraction(1, 1 if isinstance(constraint.definition, Function) else unit)
+            total += sum(chance * int(constraint.price(self._values(policy, case))) for chance, case in cases) * factor
+        return total
+
+    def _values(self, policy: Mapping[str, Mapping[tuple[int, ...], int]], case: Mapping[str, int]) -> dict[str, int]:
+        seen = {name: tuple(case[one.name] for one in self.random if name in one.seen_by) for name in policy}
+        return dict(case) | {name: rule[seen[name]] for name, rule in policy.items()}
+
     def _scenarios(self) -> Iterator[tuple[Fraction, dict[str, int]]]:
         for row in itertools.product(*(range(len(one.outcomes)) for one in self.random)):
             chance, case = Fraction(1), {}
@@ -76,9 +113,7 @@ class UncertainProblem:
             yield dict(zip(self.domains, chosen, strict=True))
 
     def _cost(self, policy: Mapping[str, Mapping[tuple[int, ...], int]], case: Mapping[str, int]) -> Fraction | None:
-        values = dict(case)
-        for name, rule in policy.items():
-            values[name] = rule[tuple(case[one.name] for one in self.random if name in one.seen_by)]
+        values = self._values(policy, case)
         unit = 10**self.units.places
         total = self.units.constant
         for number, constraint in enumerate(self.constraints):
@@ -90,6 +125,11 @@ class UncertainProblem:
                 return None
             total += int(price) * (unit if isinstance(constraint.definition, Function) else 1)
         return Fraction(total, unit)
+
+
+def probability(random: Sequence[RandomVariable], case: Mapping[str, int]) -> Fraction:
+    """Return the probability of the outcomes of `random` in `case`."""
+    return prod((one.probabilities[case[one.name]] for one in random), start=Fraction(1))
 
 
 def uncertain_problem(chance: Random, *, hard: bool = True, observed: bool = True) -> UncertainProblem:

@@ -44,6 +44,7 @@ from robochoc.cli.options.solve import (
     protocol_option,
     repair_option,
     risk_option,
+    samples_option,
     settings_option,
     standby_option,
     start_option,
@@ -60,7 +61,7 @@ _SECTIONS: Sections = {
         "--json", "--html", "--journal", "--sniff", "--help",
     ),
     "Search": (
-        "--order", "--set", "--objectives", "--risk", "--start", "--cold", "--preprocess", "--answer",
+        "--order", "--set", "--objectives", "--risk", "--samples", "--start", "--cold", "--preprocess", "--answer",
         "--no-repair", "--messages", "--ncccs", "--cycles", "--count", "--with", "--cluster",
     ),
     "Losses of robots (processes and network)": ("--on-loss", "--spare", "--patience", "--kill", "--standby"),
@@ -145,6 +146,7 @@ _SECTIONS: Sections = {
 @preprocess_option
 @answer_option
 @risk_option
+@samples_option
 @repair_option
 @objectives_option
 @messages_option

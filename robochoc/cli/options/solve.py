@@ -65,7 +65,7 @@ withdraw_option = click.option(
     "--withdraw",
     type=WithdrawalName(),
     metavar="[=KIND]",
-    help=("If there is no solution, withdraw robots: minimum (default) or maximal (fast)."),
+    help="Withdraw robots if needed: minimum (default), maximal.",
 )
 deadline_option = click.option(
     "--deadline",
@@ -86,6 +86,30 @@ risk_option = click.option(
     default="expected",
     metavar="KIND",
     help="Random variables: expected (default) or worst costs.",
+)
+
+
+class SampleNumber(WholeNumber):
+    """A number of samples, whose averages are exact decimals."""
+
+    def __init__(self) -> None:
+        super().__init__(1)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ANN401 - click's signature
+        """Return the number, or fail with the next larger valid number."""
+        from robochoc.model.sampling import sample_number
+
+        try:
+            return sample_number(super().convert(value, param, ctx))
+        except ValueError as invalid:
+            self.fail(str(invalid), param, ctx)
+
+
+samples_option = click.option(
+    "--samples",
+    type=SampleNumber(),
+    metavar="N",
+    help="Random variables: costs are averages of N samples.",
 )
 repair_option = click.option(
     "--no-repair",
@@ -183,7 +207,7 @@ filter_option = click.option(
 _SAME_NAMES = (
     "seed", "timeout", "delay", "count", "verify", "messages", "ncccs", "cycles", "spares", "patience", "filters",
     "kill", "standby", "bounds", "message_loss", "deadline", "improve", "runtime", "schedule", "withdraw", "on_loss",
-    "preprocess", "central_with", "cluster", "answer", "risk", "cold", "repair", "objectives",
+    "preprocess", "central_with", "cluster", "answer", "risk", "samples", "cold", "repair", "objectives",
 )  # fmt: skip
 """The arguments of `robochoc solve` that have the same name in `robochoc.run.Options`."""
 

@@ -14,7 +14,8 @@ from robochoc.formats.headline import describe_outcome
 from robochoc.maps.places import MapPlaces, Place
 from robochoc.model.change import team_after_events
 from robochoc.model.cost_units import Cost, cost_shown
-from robochoc.model.outcome import ALL_ROBOTS, CENTRAL_SOLVER, Metrics, Outcome, Verdict
+from robochoc.model.outcome import ALL_ROBOTS, BEST_FOR_SAMPLES, CENTRAL_SOLVER, Metrics, Outcome, Verdict
+from robochoc.model.policies import PolicyReport
 from robochoc.model.priorities import natural_key
 from robochoc.model.problem import ProblemKind, Robot, Team
 from robochoc.system.garbage import collection_paused
@@ -64,14 +65,31 @@ def outcome_report(team: Team, outcome: Outcome, ground: GroundMap | None = None
 def _uncertainty(team: Team, outcome: Outcome) -> list[str]:
     """Return a line with the expected and the worst cost, if the problem has random variables and costs."""
     report = outcome.uncertainty
-    if report is None or report.expected is None or team.kind == ProblemKind.DISCSP:
+    if report is None or team.kind == ProblemKind.DISCSP:
         return []
+    lines = _samples(report)
+    if report.expected is None:
+        return lines
     scenarios = counted(report.scenarios, "scenario")
     worst = f"unknown: there are {scenarios}"
     if report.worst is not None:
         case = ", ".join(f"{shortened(name)} = {value}" for name, value in report.worst_scenario.items())
         worst = f"{cost_shown(report.worst)} ({case or 'the same'}), of {scenarios}"
-    return [f"  expected cost {cost_shown(report.expected)}; worst case {worst}"]
+    return [f"  expected cost {cost_shown(report.expected)}; worst case {worst}", *lines]
+
+
+def _samples(report: PolicyReport) -> list[str]:
+    """Return a line with the cost for samples, if they replaced expectations."""
+    sampled = report.sampled
+    if sampled is None:
+        return []
+    line = f"  cost {cost_shown(sampled.cost)} for {counted(sampled.samples, 'sample')}"
+    if sampled.low is not None and sampled.high is not None:
+        interval = f"{cost_shown(sampled.low)} to {cost_shown(sampled.high)}"
+        line += f"; expected cost {interval} (95 % confidence, {sampled.method}, {sampled.fresh:,} other samples)"
+    elif report.expected is None:
+        line += "; expected cost unknown: its range could not be bounded"
+    return [line]
 
 
 def _front(outcome: Outcome) -> list[str]:
@@ -237,6 +255,8 @@ def _not_proven(team: Team, outcome: Outcome) -> str:
     by = _by_the_deadline(outcome)
     if known:
         return by
+    if outcome.reason == BEST_FOR_SAMPLES:
+        return f"{by} (the best for the samples)"
     if outcome.grids and outcome.cost is not None and outcome.bound is not None:
         gap, bound = abs(Decimal(outcome.cost) - Decimal(outcome.bound)), _number(outcome.bound)
         return f"{by} (at most {_number(gap)} from the {_best(team)}: {_side(team)} bound {bound})"

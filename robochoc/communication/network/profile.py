@@ -54,7 +54,8 @@ class Profile(msgspec.Struct, frozen=True, array_like=True):
     is maximised, the decimal places, and a constant. `symbols` are the names of the team's symbols, in the order of
     their codes; empty if the robot knows no symbols. `symbolic` are those `variables` whose values are symbol codes.
     `real_places` are the decimal places of those `variables` whose values are real numbers; `on_grid` is true if any of
-    the robot's variables, including hidden ones, is a real number, of which only a grid is searched.
+    the robot's variables, including hidden ones, is a real number, of which only a grid is searched. `sampled` is true
+    if its costs are averages over samples of random variables.
     """
 
     name: str
@@ -72,6 +73,7 @@ class Profile(msgspec.Struct, frozen=True, array_like=True):
     symbolic: tuple[str, ...] = ()
     real_places: dict[str, int] = {}
     on_grid: bool = False
+    sampled: bool = False
 
     @property
     def units(self) -> CostUnits:
@@ -112,6 +114,7 @@ def profile_of(robot: Robot) -> Profile:
         symbolic=tuple(v.name for v in robot.variables if v.name in shown and v.domain.symbols),
         real_places={v.name: v.domain.real.places for v in robot.variables if v.name in shown and v.domain.real},
         on_grid=any(v.domain.real for v in robot.variables),
+        sampled=robot.sampled,
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
+from robochoc.model.policies import Risk
 from robochoc.run.defaults import CENTRAL, MOST_LOSS, MOST_STANDBYS
 from robochoc.run.options import AnswerRule, CentralSolverName, OnLoss, Options, Runtime, ScheduleName, Withdrawal
 from robochoc.solver.errors import UnsupportedError
@@ -68,6 +69,11 @@ OPTION_RULES = (
     OptionRule(
         lambda o: o.delay and o.schedule in {ScheduleName.CYCLES, ScheduleName.RANDOM},
         "--delay is only for --schedule concurrent: with random, delays are arbitrary, and with cycles one cycle",
+    ),
+    OptionRule(
+        lambda o: o.samples and o.risk == Risk.WORST,
+        "--samples estimates expected costs, not the worst case",
+        "remove --samples or --risk worst",
     ),
     OptionRule(lambda o: o.deadline and o.timeout, "--deadline and --timeout both limit the time: remove one of them"),
     OptionRule(lambda o: o.improve and not o.deadline, "--improve continues after --deadline SECONDS: add --deadline"),

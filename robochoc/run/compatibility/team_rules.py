@@ -127,6 +127,11 @@ TEAM_RULES = (
         "--verify confirms optima of integer variables, and {team} has real variables, whose bound takes its place",
         "remove --verify",
     ),
+    TeamRule(
+        lambda c: c.options.verify and any(robot.sampled for robot in c.team.robots),
+        "--verify confirms optima, and answers of {team} are only the best for samples of its random variables",
+        "remove --verify",
+    ),
     TeamRule(lambda c: c.traits.lacks, "{protocol} needs {case.traits.lacks}"),
     TeamRule(
         lambda c: c.is_distributed and c.options.runtime == Runtime.ARRAYS and not c.traits.arrays,

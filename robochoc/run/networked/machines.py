@@ -20,7 +20,7 @@ from robochoc.communication.search_result import RobotsLostError, SearchResult
 from robochoc.journal.events import Began, Observer
 from robochoc.journal.team_events import start_fields
 from robochoc.model.cost_units import Cost, common_units
-from robochoc.model.outcome import ALL_ROBOTS, Answer, Improvement, Outcome, Verdict
+from robochoc.model.outcome import ALL_ROBOTS, Answer, Approximation, Improvement, Outcome, Verdict
 from robochoc.model.problem import Domain, ProblemKind, Robot, Team, Variable
 from robochoc.run.distributed import Deployment
 from robochoc.run.evaluation import Nearest, PhaseAnswer, Search, is_proven
@@ -98,9 +98,12 @@ class Machines(Deployment):
         return not self._master.members.robots
 
     @property
-    def is_on_grid(self) -> bool:
-        """See `Deployment.is_on_grid`."""
-        return any(member.profile.on_grid for member in self._master.members.robots.values())
+    def searched(self) -> Approximation | None:
+        """See `Deployment.searched`."""
+        profiles = [member.profile for member in self._master.members.robots.values()]
+        if any(profile.on_grid for profile in profiles):
+            return Approximation.GRIDS
+        return Approximation.SAMPLES if any(profile.sampled for profile in profiles) else None
 
     @property
     def unsettled(self) -> str:
@@ -156,8 +159,7 @@ class Machines(Deployment):
         def publish(answer: PhaseAnswer, improvements: tuple[Improvement, ...]) -> None:
             self._adopt(answer)
             if audience is not None and options.improve is not None:
-                now = replace(answer, improvements=improvements)
-                now = now.on_grid() if self.is_on_grid else now
+                now = replace(answer, improvements=improvements).for_whole_problem(self.searched)
                 audience.improve(team, now.as_epoch(team.order), answer.withdrawn)
 
         def keep(answer: PhaseAnswer) -> None:

@@ -209,11 +209,11 @@ def test_too_many_outcomes_are_refused(tmp_path: Path) -> None:
     parameters = f"<parameters>{' '.join(f'int {name}' for name in formals)} int H</parameters>"
     total = f"add({','.join(formals)},H)"
     body = "<expression><functional>{}</functional></expression>"
-    function = f'<function name="f">{parameters}{body.format(total)}</function></functions>'
+    function = f'<function name="f">{parameters}{body.format(f"div(1,{total})")}</function></functions>'
     predicate = f'<predicate name="p">{parameters}{body.format(f"ge({total},0)")}</predicate></predicates>'
     declared = ("</random_variables>", f"{more}</random_variables>")
     for file, own, definition, reference, message in (
-        ("Camera.xml", "camera", ("</functions>", function), "blur", "3 the expected costs have 13 decimal places"),
+        ("Camera.xml", "camera", ("</functions>", function), "blur", "24 the constraint sharp depends on 8,192 joint"),
         ("Relay.xml", "relay", ("</predicates>", predicate), "calm", "26 the constraint safe depends on 16,384 joint"),
     ):
         name = "f" if reference == "blur" else "p"

@@ -57,8 +57,8 @@ class MadeUp(Deployment):
         return tuple(self._lost)
 
     @property
-    def is_on_grid(self) -> bool:
-        return False
+    def searched(self) -> None:
+        return None
 
     @property
     def is_empty(self) -> bool:
