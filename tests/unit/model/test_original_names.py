@@ -9,7 +9,7 @@ from robochoc.model.original_names import renamed_outcome
 from tests.support.random_outcomes import NAMES, VARIABLES, random_outcome
 
 TEXTS = {"team", "protocol", "runtime", "reason", "order", "channel", "placed_by", "chosen", "name", "confirmed_by"}
-TEXTS |= {"solved_by", "stages", "repair", "led_by", "value"}
+TEXTS |= {"solved_by", "stages", "repair", "led_by", "value", "method"}
 """Fields whose texts are not names of robots and variables."""
 COUNTED = {"messages", "symbols", "objectives"}
 """Fields whose keys are types of messages, or names of symbols or objectives."""
