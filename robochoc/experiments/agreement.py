@@ -16,7 +16,7 @@ from robochoc.system.errors import RobochocError
 
 _OWN = "PROBLEM"
 """The folder for generated problems."""
-_Question = tuple[str, str | None]
+_Question = tuple[str, str | None, str | None]
 
 
 class DisagreementError(RobochocError):
@@ -24,7 +24,7 @@ class DisagreementError(RobochocError):
 
 
 class Agreement:
-    """The answers found so far, by problem and withdrawal rule."""
+    """The answers found so far, by problem, withdrawal rule and objectives."""
 
     def __init__(self) -> None:
         self._answers: dict[_Question, list[tuple[Task, Row]]] = {}
@@ -41,7 +41,7 @@ class Agreement:
             )
         if row.status != Status.DONE or "after" in task.problem.scenario:
             return
-        others = self._answers.setdefault((row.digest, task.setup.withdraw), [])
+        others = self._answers.setdefault((row.digest, task.setup.withdraw, task.setup.objectives), [])
         for other_task, other in others:
             if why := contradiction(row, other):
                 text = f"{task.setup.label} and {other_task.setup.label} contradict each other on {row.team}: {why}"
@@ -86,6 +86,7 @@ def repeat_commands(task: Task) -> str:
     words += ["--schedule", setup.schedule] if setup.schedule != "concurrent" else []
     words += ["--delay", str(setup.delay)] if setup.delay else []
     words += [f"--withdraw={setup.withdraw}"] if setup.withdraw else []
+    words += ["--objectives", setup.objectives] if setup.objectives else []
     words += ["--preprocess", setup.preprocess] if setup.preprocess else []
     words += ["--answer", setup.answer] if setup.answer != "best" else []
     words += ["--cold"] * setup.cold

@@ -23,10 +23,11 @@ from robochoc.journal.events import combined
 from robochoc.model.cost_units import Cost, common_units
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import ProblemKind, Team
+from robochoc.run.compatibility.option_rules import refuse_options
 from robochoc.run.defaults import CENTRAL
 from robochoc.run.distributed import FOUND_NOTHING, GAVE_UP
 from robochoc.run.options import Runtime
-from robochoc.run.orchestrator import solve
+from robochoc.run.orchestrator import prepare
 from robochoc.run.registry import UnknownProtocolError
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.errors import UnsupportedError
@@ -80,13 +81,17 @@ class TaskRunner(AbstractContextManager["TaskRunner"]):
         return row
 
     def _solve(self, task: Task, team: Team, row: Row) -> None:
-        curve = CostOverTime(team, task) if Recording.COST_OVER_TIME in task.record else None
-        loads = RobotLoads() if Recording.ROBOTS in task.record else None
         cpu = time.process_time()
         options = options_of(task.setup, task.limits, task.seed)
-        journal = journal_of(team, options) if Recording.JOURNAL in task.record else None
+        refuse_options(options)
+        run = prepare(team, options)
+        options = run.choice.options
+        is_recorded = Recording.COST_OVER_TIME in task.record and not (run.combined and run.combined.is_packed)
+        curve = CostOverTime(run.team, options) if is_recorded else None
+        loads = RobotLoads() if Recording.ROBOTS in task.record else None
+        journal = journal_of(run.team, options) if Recording.JOURNAL in task.record else None
         sent = curve.note_sent if curve and options.runtime == Runtime.ARRAYS else None
-        outcome = solve(team, options, observer=combined(curve, loads, journal), progress=sent, solver=self._solver)
+        outcome = run.solve(observer=combined(curve, loads, journal), progress=sent, solver=self._solver)
         row.cpu_s = None if task.is_timed else time.process_time() - cpu
         _fill(row, outcome, team)
         row.cost_over_time = curve.points() if curve else []

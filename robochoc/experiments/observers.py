@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from operator import itemgetter
 
 from robochoc.communication.search_result import Progress
-from robochoc.experiments.task import CostPoint, RobotLoad, Task, options_of
+from robochoc.experiments.task import CostPoint, RobotLoad
 from robochoc.journal.events import AnyEvent, Decided, Given, Heard, Improved, Sent
 from robochoc.journal.recorder import JournalRecorder, improvements
 from robochoc.model.outcome import Outcome
@@ -25,8 +25,8 @@ class CostOverTime:
     The recorded points correspond to the `Improved` events of a journal.
     """
 
-    def __init__(self, team: Team, task: Task) -> None:
-        self._objective = objective_to_record(team, options_of(task.setup))
+    def __init__(self, team: Team, options: Options) -> None:
+        self._objective = objective_to_record(team, options)
         self._messages = 0
         self._clock = 0
         self._seen: list[tuple[float, int, int, AnyEvent]] = []

@@ -19,10 +19,11 @@ from robochoc.run.defaults import AUTO, CENTRAL
 from robochoc.run.options import AnswerRule, Preprocess, Runtime, ScheduleName, Withdrawal
 from robochoc.run.registry import UnknownProtocolError, installed_spelling, protocol_named
 from robochoc.solver.errors import UnsupportedError
+from robochoc.system.errors import OptionError
 
 RUN_KEYS = (
     "protocol", "label", "settings", "order", "runtime", "channel", "seed", "schedule", "delay", "withdraw",
-    "preprocess", "answer", "cold", "repair", "verify", "timeout", "messages", "ncccs", "cycles",
+    "preprocess", "answer", "cold", "repair", "verify", "objectives", "timeout", "messages", "ncccs", "cycles",
 )  # fmt: skip
 _CHOICES: Mapping[str, Sequence[str]] = {
     "runtime": tuple(map(str, Runtime)),
@@ -36,6 +37,7 @@ MOST_SETUPS = 2000
 """The maximum number of ways to run in a table."""
 _LABELLED = (
     "order", "runtime", "channel", "schedule", "delay", "withdraw", "preprocess", "answer", "cold", "repair", "verify",
+    "objectives",
 )  # fmt: skip
 """The options that a label may contain, in addition to the protocol and its settings."""
 _OWN_LIMITS = ("timeout", "messages", "ncccs", "cycles")
@@ -124,7 +126,7 @@ def _refuse(setup: Setup, limits: Limits, place: Place) -> None:
             refuse_settings(setup.protocol, protocol_named(setup.protocol), setup.settings)
     except UnknownProtocolError as unknown:
         raise place.mistake("protocol", str(unknown), "robochoc protocols lists them") from None
-    except UnsupportedError as refused:
+    except (OptionError, UnsupportedError) as refused:
         raise place.mistake("", str(refused)) from None
 
 

@@ -74,6 +74,7 @@ class Setup(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tru
     cold: bool = False
     repair: bool = False
     verify: bool = False
+    objectives: str | None = None
 
 
 class Limits(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True, omit_defaults=True):

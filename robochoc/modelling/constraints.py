@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from robochoc.formats.names import is_name
 from robochoc.model.constraint import WhenAbsent
 from robochoc.modelling.errors import ModelError, ModelTypeError, SourceLine
 from robochoc.modelling.numbers import Exact, exact, is_infinite, is_truth, shown
@@ -87,6 +88,15 @@ def check_owned(term: Term, known: Mapping[str, ModelVariable], place: SourceLin
 def exact_or_none(cost: object) -> Exact | None:
     """Return the exact cost of a constraint, or None for a hard constraint, whose cost is None or infinite."""
     return None if cost is None or (is_infinite(cost) and cost == math.inf) else exact(cost)
+
+
+def objective_name(objective: object, place: SourceLine) -> str:
+    """Return a valid name of an objective, or an empty text for the single cost. Raises `ModelError`."""
+    if not isinstance(objective, str):
+        raise ModelTypeError(f"invalid objective {objective!r}", "expected the name of an objective", place)
+    if objective and not is_name(objective):
+        raise ModelError(f"invalid objective {objective!r}", "a letter, then letters, digits, '.' and '_'", place)
+    return objective
 
 
 def absence_or_none(when_absent: WhenAbsent | str | None, place: SourceLine) -> WhenAbsent | None:

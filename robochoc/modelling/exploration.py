@@ -105,7 +105,12 @@ class _Searches:
         """True if the central solver can list the other solutions instead of searching for each."""
         solver = self._options.get("central_with", CentralSolverName.AUTO)
         ace = solver in {CentralSolverName.AUTO, CentralSolverName.ACE}
-        return self.found[0].protocol == CENTRAL and ace and self._options.keys() <= LISTING_OPTIONS
+        return (
+            self.found[0].protocol == CENTRAL
+            and not self.team.objectives
+            and ace
+            and self._options.keys() <= LISTING_OPTIONS
+        )
 
     @property
     def timeout_s(self) -> float | None:

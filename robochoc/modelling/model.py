@@ -30,7 +30,14 @@ from robochoc.model.outcome import Outcome
 from robochoc.model.problem import Team
 from robochoc.model.random_variable import RandomVariable
 from robochoc.modelling.codes import Symbols
-from robochoc.modelling.constraints import ModelConstraint, absence_or_none, check_owned, conditions_in, exact_or_none
+from robochoc.modelling.constraints import (
+    ModelConstraint,
+    absence_or_none,
+    check_owned,
+    conditions_in,
+    exact_or_none,
+    objective_name,
+)
 from robochoc.modelling.drafts import ObjectiveTerm, split
 from robochoc.modelling.errors import ModelError, ModelTypeError, SourceLine, UnknownNameError, calling_line
 from robochoc.modelling.events import ModelEvent
@@ -274,8 +281,9 @@ class Model(Solvable):
             )
         term = number(given)
         check_owned(term, self.variables, place)
-        parts, constant = split(term, place, check_places(places), objective)
-        if objective and constant:
+        name = objective_name(objective, place)
+        parts, constant = split(term, place, check_places(places), name)
+        if name and constant:
             raise ModelError("the sum of an objective has a constant", "leave it out: it changes no choice", place)
         self._objective += parts
         self.constant += constant
@@ -296,7 +304,11 @@ class Model(Solvable):
         term = all_of(conditions_in(constraints, place))
         check_owned(term, self.variables, place, event)
         absence = absence_or_none(when_absent, place)
-        rule = ModelConstraint(name or self._free_name(), term, exact_or_none(cost), place, absence, objective)
+        price, objective = exact_or_none(cost), objective_name(objective, place)
+        if objective and price is None:
+            message = f"a hard constraint belongs to the objective {objective}"
+            raise ModelError(message, "add a cost, or leave the objective out", place)
+        rule = ModelConstraint(name or self._free_name(), term, price, place, absence, objective)
         if absence == WhenAbsent.RESTATE:
             list(rule.drafts())
         return rule

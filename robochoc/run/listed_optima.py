@@ -21,6 +21,8 @@ from robochoc.verification.checker import RefutedError
 
 MOST_POINTS = 100_000
 """The maximum number of points of a team's Pareto front."""
+MOST_SUMS = 20 * MOST_POINTS
+"""The maximum number of sums of two points of unconnected parts of a team."""
 
 
 class _Tree(NamedTuple):
@@ -57,7 +59,7 @@ def combined_front(
 
     Raises:
         RefutedError: if the robots of a tree have listed different numbers of points.
-        TooLargeError: if the fronts of several trees add up to too many points.
+        TooLargeError: if the fronts of several trees have too many sums, or add up to too many points.
     """
     points = {name: found.points for name, found in result.findings.items() if found.points is not None}
     if len(points) < len(compiled.team.robots):
@@ -68,6 +70,11 @@ def combined_front(
         packed = points[_root(result.findings, next(iter(tree.places)))].packed
         if len(packed) != tree.listed:
             raise RefutedError(f"a root of {compiled.team.name} has listed {len(packed)} costs of {tree.listed} points")
+        if len(total) * len(packed) > MOST_SUMS:
+            raise TooLargeError(
+                f"the Pareto fronts of unconnected parts of {compiled.team.name} have {len(total):,} and"
+                f" {len(packed):,} points, and at most {MOST_SUMS:,} sums of two points are compared"
+            )
         sums = {
             one + other: (*before, place)
             for place, other in reversed([*enumerate(packed)])

@@ -6,16 +6,19 @@ finds fronts. Afterwards, the costs in each objective are computed from the file
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from fractions import Fraction
 from itertools import accumulate
 from typing import NamedTuple, TypeVar
 
 from robochoc.formats import InvalidInputError, check_team
+from robochoc.formats.diagnostics import shortened
 from robochoc.model.change import team_after_events
+from robochoc.model.cost_units import Cost
 from robochoc.model.objectives import PARETO, Combination, ObjectivesMode
-from robochoc.model.outcome import EpochOutcome, FrontPoint, Outcome, Verdict
-from robochoc.model.problem import Team
+from robochoc.model.outcome import Answer, EpochOutcome, FrontPoint, Outcome, Verdict
+from robochoc.model.problem import ScenarioEvent, Team
 from robochoc.run.defaults import AUTO, CENTRAL, FRONT_PROTOCOL
 from robochoc.run.options import OnLoss, Options, Runtime
 from robochoc.run.registry import protocol_named
@@ -61,12 +64,14 @@ class CombinedRun:
     Attributes:
         original: The team with its objectives.
         mode: The treatment of the objectives.
+        weights: The factor of each objective in the single cost.
         team: The team with a single cost.
         options: The options for that team.
     """
 
     original: Team
     mode: ObjectivesMode
+    weights: Mapping[str, int]
     team: Team
     options: Options
 
@@ -74,6 +79,15 @@ class CombinedRun:
     def is_central_front(self) -> bool:
         """Return whether the front is enumerated, after the central solver has found its first point."""
         return self.options.protocol == CENTRAL and self.mode.combination == Combination.PARETO
+
+    @property
+    def is_packed(self) -> bool:
+        """Return whether costs in the run are packed vectors, which are not costs of the user."""
+        return self.mode.combination != Combination.WEIGHTED
+
+    def after(self, added: Iterable[ScenarioEvent]) -> CombinedRun:
+        """Return this run with the events that an environment has added to the scenario."""
+        return replace(self, original=replace(self.original, scenario=(*self.original.scenario, *added)))
 
     def outcome(self, outcome: Outcome) -> Outcome:
         """Return `outcome`, of the team with a single cost, with the costs in each objective.
@@ -88,7 +102,7 @@ class CombinedRun:
             [self._with_objectives(epoch, number) for epoch, number in zip(outcome.epochs, events, strict=False)]
         )
         found = replace(self._with_objectives(outcome, outcome.events), epochs=epochs)
-        if self.mode.combination != Combination.WEIGHTED:  # combined costs are packed
+        if self.is_packed:
             found = replace(found, stages=tuple([one._replace(cost=None) for one in outcome.stages]))
         if not outcome.front:
             return found
@@ -96,23 +110,30 @@ class CombinedRun:
             [FrontPoint(objective_costs(self.original, one.assignment), one.assignment) for one in found.front]
         )
         check_front(self.original, front)
-        found = replace(found, front=front)
-        if self.options.verify and confirm_front(self.original, [one.objectives for one in front]):
-            confirmed = tuple(dict.fromkeys([*outcome.confirmed_by, ENUMERATION]))
-            found = replace(found, confirmed=True, confirmed_by=confirmed)
-        return found
+        wanted = self.options.verify and not self.is_central_front  # other solvers have confirmed the first point only
+        is_confirmed = wanted and confirm_front(self.original, [one.objectives for one in front])
+        return replace(found, front=front, confirmed=is_confirmed, confirmed_by=(ENUMERATION,) if is_confirmed else ())
 
     def _with_objectives(self, answer: _Answer, events: int) -> _Answer:
-        """Return an answer, after this number of events, with the costs in each objective."""
-        single = self.mode.combination == Combination.WEIGHTED
+        """Return an answer, after this number of events, with the costs in each objective, if they are known."""
         if not answer.assignment:
-            return answer if single else replace(answer, bound=None)
-        now = team_after_events(self.original, events)
-        costs = objective_costs(now, answer.assignment, robots_without_values(now, answer.assignment))
-        if single:
+            return replace(answer, bound=None) if self.is_packed else answer
+        costs = self._costs(answer, events)
+        if not self.is_packed:
             return replace(answer, objectives=costs)
         first = (self.mode.order or self.original.objectives)[0]
-        return replace(answer, objectives=costs, cost=costs[first], bound=None)
+        return replace(answer, objectives=costs, cost=costs.get(first), bound=None)
+
+    def _costs(self, answer: Answer, events: int) -> dict[str, Cost]:
+        """Return the cost of an answer in each objective; empty if they do not add up to the cost in the run.
+
+        This is the case if constraints were lost with the robots that held them, or if an environment adds costs, which
+        belong to no objective.
+        """
+        now = team_after_events(self.original, events)
+        costs = objective_costs(now, answer.assignment, robots_without_values(now, answer.assignment))
+        total = sum(self.weights[name] * Fraction(cost) for name, cost in costs.items())
+        return costs if answer.cost is None or total == Fraction(answer.cost) else {}
 
 
 ENUMERATION = "enumeration"
@@ -143,11 +164,22 @@ def combined_run(team: Team, options: Options, *, environment: bool = False) -> 
         return _front_run(team, options, environment=environment)
     if mode.combination == Combination.LEXICOGRAPHIC and options.improve:
         raise UnsupportedError("--improve cannot be combined with --objectives lexicographic: choose weighted")
-    return CombinedRun(team, mode, with_single_cost(team, mode), replace(options, objectives=mode))
+    if options.spares:
+        raise UnsupportedError(
+            "--spare cannot be combined with several objectives, since a robot that comes back reads its own file, in"
+            " which they are not combined: robochoc export --objectives writes a problem with a single cost"
+        )
+    weights = _weights(team, mode)
+    return CombinedRun(team, mode, weights, _single_cost(team, weights), replace(options, objectives=mode))
 
 
 def with_single_cost(team: Team, mode: ObjectivesMode) -> Team:
     """Return `team` with the weighted or lexicographic sum of its objectives as the cost. Raises `UnsupportedError`."""
+    return _single_cost(team, _weights(team, mode))
+
+
+def _weights(team: Team, mode: ObjectivesMode) -> dict[str, int]:
+    """Return the factor of each objective in the weighted or lexicographic sum. Raises `UnsupportedError`."""
     if mode.combination == Combination.PARETO or not team.objectives:
         raise UnsupportedError(
             f"{team.name} has a single cost: remove --objectives"
@@ -157,12 +189,12 @@ def with_single_cost(team: Team, mode: ObjectivesMode) -> Team:
     if {*mode.names} != {*team.objectives}:
         names = ", ".join(team.objectives)
         raise UnsupportedError(
-            f"{team.name} has the objectives {names}, and --objectives {mode} does not name exactly these: name each"
+            f"{team.name} has the objectives {names}, and --objectives {shortened(str(mode))} does not name exactly"
+            " these: name each"
         )
-    weights = dict(mode.weights)
     if mode.combination == Combination.LEXICOGRAPHIC:
-        weights = lexicographic_weights(mode.order, lexicographic_bases(team, mode.order))
-    return _single_cost(team, weights)
+        return lexicographic_weights(mode.order, lexicographic_bases(team, mode.order))
+    return dict(mode.weights)
 
 
 def _default_mode(team: Team, options: Options) -> ObjectivesMode:
@@ -197,7 +229,8 @@ def _front_run(team: Team, options: Options, *, environment: bool) -> CombinedRu
         raise _no_front(team, options.protocol)
     order = team.objectives
     bases = lexicographic_bases(team, order)
-    single = _single_cost(team, lexicographic_weights(order, bases))
+    weights = lexicographic_weights(order, bases)
+    single = _single_cost(team, weights)
     if options.protocol != CENTRAL:
         options = replace(options, settings={**options.settings, "bases": ",".join(map(str, bases))})
     elif assignments_of(team) > MOST_ASSIGNMENTS:
@@ -205,7 +238,7 @@ def _front_run(team: Team, options: Options, *, environment: bool) -> CombinedRu
             f"{team.name} has {assignments_of(team):,} assignments, and --protocol central finds a Pareto front by"
             f" enumerating at most {MOST_ASSIGNMENTS:,}: choose --protocol {FRONT_PROTOCOL}"
         )
-    return CombinedRun(team, PARETO, with_all_solutions(single), replace(options, objectives=PARETO))
+    return CombinedRun(team, PARETO, weights, with_all_solutions(single), replace(options, objectives=PARETO))
 
 
 def _single_cost(team: Team, weights: Mapping[str, int]) -> Team:

@@ -14,9 +14,9 @@ from robochoc.journal.events import Observer
 from robochoc.model.change import team_after_events
 from robochoc.model.costs import NormalizationError, normalized
 from robochoc.model.orders import OrderError
-from robochoc.model.outcome import Outcome, Verdict
+from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.policies import Risk
-from robochoc.model.problem import Team
+from robochoc.model.problem import ScenarioEvent, Team
 from robochoc.model.sampling import Samples
 from robochoc.model.symbols import real_places, symbol_table, symbolic_variables
 from robochoc.model.uncertainty import AUTOMATIC, UncertaintyError, is_uncertain, sampled_team
@@ -131,13 +131,26 @@ class PreparedRun:
 
             return solve_on_grids(self.team, self.choice.options, solve_grid)
         context = RunContext(self.choice.options, observer, progress, solver, self.spent_s)
-        outcome = _solved(self.team, context, environment, audience)
+        added: list[ScenarioEvent] = []
+        outcome = _solved(self.team, context, environment and _noting(environment, added), audience)
         if self.uncertain and outcome.assignment and not outcome.epochs:
             from robochoc.verification.policies import policy_report  # noqa: PLC0415 - start-up: rarely needed
 
             report = policy_report(self.uncertain, outcome, self.choice.options.risk, self.samples)
             return replace(outcome, uncertainty=report)
-        return outcome if self.combined is None else self.combined.outcome(outcome)
+        return outcome if self.combined is None else self.combined.after(added).outcome(outcome)
+
+
+def _noting(environment: Environment, added: list[ScenarioEvent]) -> Environment:
+    """Return `environment`, which appends its events to `added`."""
+
+    def noting(team: Team, ended: EpochOutcome, left_s: float | None) -> ScenarioEvent | None:
+        event = environment(team, ended, left_s)
+        if event is not None:
+            added.append(event)
+        return event
+
+    return noting
 
 
 def prepare(team: Team, options: Options, *, environment: bool = False, ordered: bool = True) -> PreparedRun:

@@ -40,9 +40,12 @@ def enumerated_front(team: Team) -> dict[Vector, dict[str, int]]:
             found.setdefault(tuple(objective_costs(team, assignment).values()), assignment)
     maximize = team.robots[0].costs.maximize
     best: list[Vector] = []
+    steps: list[Vector] = []  # the best vectors so far without the first objective
     for one in sorted(found, reverse=maximize):  # a vector follows those that dominate it
-        if not any(dominates(other, one, maximize=maximize) for other in best):
+        rest = one[1:]
+        if not any(step == rest or dominates(step, rest, maximize=maximize) for step in steps):
             best.append(one)
+            steps = [step for step in steps if not dominates(rest, step, maximize=maximize)] + [rest]
     return {one: found[one] for one in best}
 
 

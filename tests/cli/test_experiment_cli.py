@@ -300,6 +300,28 @@ def test_compare_a_family_and_folders(tmp_path: Path) -> None:
     assert not list(tmp_path.glob("compare*"))
 
 
+@pytest.mark.usefixtures("runs_here")
+def test_compare_combines_objectives_or_says_why_no_run_is_possible(tmp_path: Path) -> None:
+    words = ("compare", "heights", "agents=3", "levels=2", "seed=1..2", "--protocols", "dpop,mgm")
+    refused = robochoc_within(*words, folder=tmp_path)
+    assert (refused.returncode, refused.stdout) == (2, "")
+    assert refused.stderr.startswith("compare: every run was refused: heights-3-2-")
+    assert len(refused.stderr.splitlines()) == 1
+    done = robochoc_within(*words, "--objectives", "weighted:energy=1,risk=1", folder=tmp_path)
+    assert done.returncode == 0
+    assert "dpop        2" in done.stdout
+    invalid = robochoc_within(*words, "--objectives", "energy", folder=tmp_path)
+    assert (invalid.returncode, "is not a way to combine objectives" in invalid.stderr) == (2, True)
+
+
+def test_objectives_of_a_study(tmp_path: Path) -> None:
+    path = tmp_path / "study.toml"
+    path.write_text(SMALL.replace("[runs]", '[runs]\nobjectives = "energy"'))
+    refused = robochoc_within("experiment", "run", path)
+    assert (refused.returncode, refused.stdout) == (1, "")
+    assert "'energy' is not a way to combine objectives" in refused.stderr
+
+
 def test_what_compare_cannot_take_is_wrong_usage() -> None:
     for words, said in [
         ("random --protocols ,", "--protocols is empty"),

@@ -12,15 +12,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import robochoc
-from robochoc.journal.journal import read_journal
+from robochoc.journal.journal import JournalRecorder, read_journal
 from robochoc.model.objectives import PARETO, ObjectivesMode, non_dominated, objectives_mode, place_values, unpacked
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
-from robochoc.model.problem import Team
+from robochoc.model.problem import RemoveConstraint, ScenarioEvent, Team
+from robochoc.privacy import privacy_of
 from robochoc.protocols.inference.mo_dpop import MODPOPSettings
 from robochoc.replay import replay
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.objectives import combined_run
 from robochoc.run.options import ScheduleName
+from robochoc.run.orchestrator import prepare
+from robochoc.run.recording import journal_header
 from robochoc.solver.errors import UnsupportedError
 from robochoc.verification.checker import RefutedError
 from robochoc.verification.front import check_front, confirm_front, enumerated_front
@@ -46,6 +49,7 @@ def check_fronts(seed: int, *, verify: bool) -> None:
     assert outcome.verdict == (Verdict.OPTIMAL if expected else Verdict.NO_SOLUTION), seed
     if expected:
         assert (outcome.protocol, outcome.confirmed) == ("mo-dpop", verify)
+        assert outcome.confirmed_by == ("enumeration",) * verify
         assert outcome.assignment == outcome.front[0].assignment
         assert found == sorted(found)
         assert {as_vector(team, point.objectives) for point in simulated(team, "central").front} == expected
@@ -151,6 +155,7 @@ def trade_off(size: int = 3) -> robochoc.Model:
         ("auto", {"deadline": 1}, "--deadline cannot be combined"),
         ("auto", {"message_loss": 0.1}, "--message-loss cannot be combined"),
         ("auto", {"objectives": "weighted:energy=1"}, "has the objectives energy, risk"),
+        ("dpop", {"objectives": "lexicographic:" + ",".join(f"a{n}" for n in range(999))}, r"a12,a\.\.\. does not"),
         ("mo-dpop", {"settings": {"vectors": "3"}}, "more than 3 cost vectors.* or combine the objectives"),
         ("dpop", {"objectives": "weighted:energy=1000000000,risk=1000000000", "seed": 1}, ""),
     ],
@@ -161,6 +166,29 @@ def test_refusals_name_the_next_step(protocol: str, options: dict[str, object], 
             simulated(trade_off().team, protocol, **options)
     else:
         assert simulated(trade_off().team, protocol, **options).verdict == Verdict.OPTIMAL
+
+
+def test_a_robot_that_returns_has_no_combined_costs() -> None:
+    options = Options(protocol="dpop", objectives=objectives_mode("weighted:energy=1,risk=1"), spares=1)
+    with pytest.raises(UnsupportedError, match="--spare cannot be combined with several objectives"):
+        combined_run(trade_off().team, options)
+
+
+def test_messages_never_exclude_the_truth() -> None:
+    chance = drawn("proofs of tables of vectors")
+    for _ in range(10):
+        run = prepare(random_team(chance), Options(runtime=Runtime.SIMULATOR))
+        recorder = JournalRecorder(journal_header(run.team, run.choice.options))
+        recorder.outcome = run.solve(observer=recorder)
+        if recorder.outcome.metrics.messages:  # otherwise a robot without values has ended the run
+            report = privacy_of(read_journal(recorder.content()))  # raises an error if the truth is excluded
+            assert not report.without_rule
+
+
+def test_solutions_are_listed_from_the_first_point_of_the_front_on() -> None:
+    listed = [tuple(solution.objectives.values()) for solution in trade_off(2).solutions()]
+    assert listed == sorted(listed)
+    assert len({*map(str, listed)}) > 1
 
 
 def test_objectives_are_refused_for_a_single_cost() -> None:
@@ -241,20 +269,34 @@ def test_costs_after_a_loss_are_those_of_the_other_robots() -> None:
     run = combined_run(team, Options(protocol="dpop", objectives=objectives_mode("lexicographic:risk,energy")))
     assert run is not None
     assignment = {"drone1.height": 5, "drone2.height": 5}
+    combined = 30 * run.weights["energy"] - 70 * run.weights["risk"]
     epochs = (
         EpochOutcome(verdict=Verdict.UNKNOWN, robots=team.order, opened_by="", lost=("drone0",)),
         EpochOutcome(
             verdict=Verdict.OPTIMAL,
             assignment=assignment,
-            cost=12345,
+            cost=combined,
             robots=("drone1", "drone2"),
             opened_by="",
         ),
     )
     found = simulated(team, "dpop", objectives="lexicographic:risk,energy")
-    outcome = run.outcome(replace(found, assignment=assignment, cost=12345, epochs=epochs, lost=("drone0",)))
+    outcome = run.outcome(replace(found, assignment=assignment, cost=combined, epochs=epochs, lost=("drone0",)))
     assert (outcome.cost, outcome.objectives) == (-70, {"energy": 30, "risk": -70})
     assert outcome.epochs[1].cost == -70
+    outcome = run.outcome(replace(found, assignment=assignment, cost=combined + 1, lost=("drone0",)))
+    assert (outcome.cost, outcome.objectives) == (None, {})  # robots are lost with their files on a network
+
+
+@pytest.mark.parametrize("mode", ["weighted:energy=2,risk=3", "lexicographic:risk,energy"])
+def test_events_of_an_environment_change_the_costs_in_each_objective(mode: str) -> None:
+    model = trade_off()
+    model.add(model["drone0.height"] + model["drone1.height"] >= 10, cost=7, name="high", objective="risk")
+    events = [ScenarioEvent((RemoveConstraint("drone1", "drone0", "high"),))]
+    solution = model.solve("dpop", objectives=mode, environment=lambda *_: events.pop() if events else None)
+    before, after = [epoch.objectives for epoch in solution.epochs]
+    assert before["risk"] - after["risk"] == 7
+    assert before["energy"] == after["energy"]
 
 
 @pytest.mark.parametrize("bases", ["0", "a", "1,2,3", "1,,2", str(2**63)])

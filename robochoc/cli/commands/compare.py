@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from robochoc.cli.options.paths import OutputFile
+from robochoc.cli.options.solve import objectives_option
 from robochoc.cli.options.value_types import Number, WholeNumber
 from robochoc.cli.reports.failures import invalid_input_fails
 
@@ -29,6 +30,7 @@ DEFAULT_SEEDS = "1..10"
 @click.option("--runtime", default="simulator", show_default=True, metavar="NAME", help="simulator, arrays, processes.")
 @click.option("--schedule", metavar="NAME", help="Schedule of the simulator: concurrent, one-by-one, cycles, random.")
 @click.option("--channel", metavar="NAME", help="Channel model of the simulator: wlan, wpan, wman, wwan.")
+@objectives_option
 @click.option(
     "--timeout", type=Number(0, min_open=True), default=30, show_default=True, metavar="SECONDS",
     help="Time limit of each run.",
@@ -92,12 +94,14 @@ def _study(problem: Sequence[str], over: str | None, runs: dict[str, Any]) -> St
     settings = dict(_pair(word, "--set") for word in runs.pop("settings"))
     order = runs.pop("order")
     timeout = runs.pop("timeout")
+    objectives = runs.pop("objectives")
     table: dict[str, Any] = {
         "protocol": protocols,
         **{name: value for name, value in runs.items() if value is not None},
     }
     table |= {"order": order.split(",")} if order else {}
     table |= {"settings": settings} if settings else {}
+    table |= {"objectives": str(objectives)} if objectives else {}
     report = {"over": over} if over else {}
     title = on_one_line(shortened(f"{', '.join(protocols)} on {' '.join(Path(word).name for word in problem)}"))
     tables = {

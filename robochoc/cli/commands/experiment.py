@@ -292,7 +292,7 @@ def carry_out(
     workers: Callable[[int | None], Workers] | None = None,
     again: Sequence[str] = (),
 ) -> Counter[str]:
-    """Run a study, and show its progress on a terminal. Each foreseen error becomes a `Failure`."""
+    """Run a study, and show its progress on a terminal. Raises `Failure`, also if every run was refused."""
     from robochoc.cli.reports.experiment import progress_of
     from robochoc.experiments.agreement import DisagreementError
     from robochoc.experiments.plan import TooManyRunsError
@@ -302,7 +302,7 @@ def carry_out(
     try:
         with progress_of(study.name) as progress:
             once_more = [Status(one) for one in again]
-            return run_study(study, store, jobs, progress=progress, workers=workers, again=once_more)
+            ended = run_study(study, store, jobs, progress=progress, workers=workers, again=once_more)
     except KeyboardInterrupt:
         saved = len(store.results().rows)
         click.echo(f"\n{study.name}: {saved:,} runs are saved; the same command continues with the others", err=True)
@@ -311,3 +311,6 @@ def carry_out(
         raise Failure(LOST, f"{study.name}: stopped: {error}") from None
     except TooManyRunsError as refused:
         raise Failure(INVALID, f"{study.name}: {refused}") from None
+    if {*ended} == {Status.REFUSED}:
+        raise Failure(USAGE, f"{study.name}: every run was refused: {store.results().rows[0]['reason']}")
+    return ended

@@ -190,11 +190,13 @@ def _opened(
 def _teams(paths: Sequence[Path]) -> list[Team]:
     """Return the teams in or below the folders `paths`. Raises `Failure`."""
     from robochoc.formats.problems import read_problem
+    from robochoc.model.costs import refuse_several_objectives
 
     teams: dict[str, Team] = {}
     for folder in teams_at(paths, foreign=True):
         with errors_as_failures(folder):
             team = read_problem(folder).team
+            refuse_several_objectives(team)
         if team.name in teams:
             raise Failure(USAGE, f"two teams have the name {team.name!r}: rename the folder of one of them")
         teams[team.name] = team

@@ -12,7 +12,7 @@ From the root down, each robot then chooses a value for each point of the front.
   needs more ends; `bases`, the number system of packed vectors, set by the run.
 - **Reference**: the principle is that of Rollón: "Multi-objective optimization in graphical models", PhD thesis,
   2008 (bucket elimination on vectors), and of Matsui, Silaghi, Hirayama, Yokoo, Matsuo: "Distributed search method with
-  bounded cost vectors on multiple objective DCOPs", PRIMA 2012. Their texts were not available: this is built from the
+  bounded cost vectors on multiple objective DCOPs", PRIMA 2012. Only their abstracts were found: this is built from the
   principle.
 
 Choices:
@@ -45,8 +45,9 @@ import msgspec
 from robochoc.model.objectives import added, non_dominated
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.disclosure import NOTHING, HasValue, Proof, Reception, table_proves
 from robochoc.protocols.findings import Findings, ListedPoints
-from robochoc.protocols.inference.dpop import Domain, store_once
+from robochoc.protocols.inference.dpop import MOST_CELLS, Domain, store_once
 from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.settings import Settings
@@ -106,6 +107,13 @@ class Fronts(Message, frozen=True):
         vectors = counted(sum(map(len, self.cells)), "cost vector")
         return f"{vectors} of my subtree, in a table{' over ' if axes else ''}{axes}"
 
+    def proves(self, reception: Reception) -> Sequence[Proof] | None:
+        """Return the bounds on the sender's packed costs, as in DPOP: the first vector of a cell is the least."""
+        if len(self.cells) != math.prod(self.axes.values()) or len(self.cells) > MOST_CELLS:
+            return None
+        least = [cell[0] if cell else math.inf for cell in self.cells]
+        return table_proves([*self.axes], zip(_places(self.axes), least, strict=True), reception)
+
 
 class Points(Message, frozen=True):
     """For each point of the front, the values in the receiver's separator, and the receiver's vector.
@@ -122,6 +130,21 @@ class Points(Message, frozen=True):
         different = counted(len({*map(tuple, self.assignments)}), "combination")
         points = counted(len(self.vectors), "point")
         return f"{points} of the front, with {different} of values of the robots in your separator"
+
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        """Return the values in the first point, which the team adopts."""
+        table = reception.last(Fronts, reception.receiver, reception.sender)
+        if table is None:
+            return NOTHING  # received in another epoch
+        known = [
+            (robot, reception.values(robot), at) for robot, at in zip(table.axes, self.assignments[0], strict=True)
+        ]
+        return [HasValue(robot, values[at]) for robot, values, at in known if values is not None]
+
+
+def _places(axes: Mapping[str, int]) -> Iterator[tuple[int, ...]]:
+    """Yield the combinations of values on these axes, as indices, in the order of a table's cells."""
+    return itertools.product(*map(range, axes.values()))
 
 
 class _Table(NamedTuple):
@@ -240,7 +263,7 @@ class MODPOP(TreeProtocol):
     def _combinations(self) -> Iterator[dict[str, int]]:
         """Yield the combinations of the values of the separator, as indices, in the order of the table's cells."""
         axes = self.axes or {}
-        for places in itertools.product(*map(range, axes.values())):
+        for places in _places(axes):
             yield dict(zip(axes, places, strict=True))
 
     def _cell(self, costs: Sequence[Cost], places: Mapping[str, int]) -> list[int]:

@@ -181,10 +181,10 @@ def test_a_protocol_that_fails_is_a_row(bench: TaskRunner, monkeypatch: pytest.M
     def fail(*_: object, **__: object) -> None:
         raise KeyError("mine")
 
-    monkeypatch.setattr("robochoc.experiments.execute.solve", fail)
+    monkeypatch.setattr("robochoc.experiments.execute.prepare", fail)
     found = bench.run(Task(problem=RANDOM, setup=Setup(protocol="abt")))
     assert (found.status, found.reason) == (Status.ERROR, "KeyError: 'mine'")
-    monkeypatch.setattr("robochoc.experiments.execute.solve", _no_memory)
+    monkeypatch.setattr("robochoc.experiments.execute.prepare", _no_memory)
     assert bench.run(Task(problem=RANDOM, setup=Setup(protocol="abt"))).status is Status.MEMORY
 
 
@@ -220,6 +220,31 @@ def test_a_run_that_ends_before_the_last_problem_has_no_cost(bench: TaskRunner) 
     )
     assert without.cost is not None
     assert without.assignment
+
+
+HEIGHTS = ProblemSpec(family="heights", parameters={"agents": 3, "levels": 3})
+
+
+@pytest.mark.parametrize(
+    ("setup", "measured"),
+    [
+        ({"protocol": "mo-dpop"}, False),
+        ({"protocol": "dsa", "objectives": "lexicographic:risk,energy"}, False),
+        ({"protocol": "dsa", "objectives": "weighted:energy=1,risk=2"}, True),
+    ],
+)
+def test_several_objectives_are_recorded(setup: dict[str, object], measured: bool, bench: TaskRunner) -> None:  # noqa: FBT001
+    found = row(bench, HEIGHTS, setup, tuple(Recording))
+    assert found.status is Status.DONE, found.reason
+    assert found.journal
+    assert bool(found.cost_over_time) is measured  # packed costs are not the user's
+    if measured:
+        assert found.cost_over_time[-1].cost == found.cost
+
+
+def test_a_protocol_for_a_single_cost_refuses_several_objectives(bench: TaskRunner) -> None:
+    found = row(bench, HEIGHTS, {"protocol": "dpop"}, tuple(Recording))
+    assert (found.status, "several objectives (energy, risk)" in (found.reason or "")) == (Status.REFUSED, True)
 
 
 def test_a_scenario_is_drawn(bench: TaskRunner) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -109,6 +110,20 @@ def test_a_model_with_objectives_has_no_other_costs() -> None:
     model = drones()
     with pytest.raises(ModelError, match="has a constant"):
         model.minimize(model["drone1.height"] + 1, objective="energy")
+
+
+@pytest.mark.parametrize(
+    ("given", "cost", "message"),
+    [
+        (3, 1, "invalid objective 3 (expected the name of an objective)"),
+        ("low cost", 1, "invalid objective 'low cost' (a letter, then letters"),
+        ("risk", None, "a hard constraint belongs to the objective risk (add a cost"),
+    ],
+)
+def test_invalid_objectives_of_a_model_are_named_with_their_line(given: object, cost: int | None, message: str) -> None:
+    model = drones()
+    with pytest.raises(ModelError, match=rf"test_objectives\.py:\d+: {re.escape(message)}"):
+        model.add(model["drone1.height"] == 1, cost=cost, objective=given)  # type: ignore[arg-type]
 
 
 def test_a_single_cost_is_required_where_objectives_were_not_combined() -> None:

@@ -171,11 +171,12 @@ def test_a_region_of_kopt_tells_exactly_what_values_and_pairs_cost() -> None:
     assert loss(report, "RC", "RA", Kind.DOMAIN).known == 0
 
 
-def test_tables_of_count_dpop_prove_what_those_of_dpop_do_and_goods_of_o_dpop_no_more() -> None:
-    dpop, counted, opened = (
-        loss(report_of(PRICED, name), "RA", "RB", Kind.DOMAIN).linear or 0 for name in ("dpop", "count-dpop", "o-dpop")
+def test_tables_of_count_dpop_and_mo_dpop_prove_what_those_of_dpop_do_and_goods_of_o_dpop_no_more() -> None:
+    dpop, counted, vectors, opened = (
+        loss(report_of(PRICED, name), "RA", "RB", Kind.DOMAIN).linear or 0
+        for name in ("dpop", "count-dpop", "mo-dpop", "o-dpop")
     )
-    assert dpop == counted
+    assert dpop == counted == vectors
     assert 0 < opened <= dpop
 
 
