@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from robochoc.cli.options.paths import OutputFile
+from robochoc.cli.options.sections import COMMON, SectionedCommand, Sections
 from robochoc.cli.options.solve import objectives_option
 from robochoc.cli.options.value_types import Number, WholeNumber
 from robochoc.cli.reports.failures import invalid_input_fails
@@ -18,9 +19,16 @@ if TYPE_CHECKING:
     from robochoc.experiments.study import Study
 
 DEFAULT_SEEDS = "1..10"
+_SECTIONS: Sections = {
+    COMMON: ("--protocols", "--set", "--timeout", "--jobs", "--help"),
+    "Problem and runs": ("--objectives", "--order", "--runtime", "--schedule", "--channel"),
+    "Results": ("--over", "--html", "--save"),
+}
 
 
-@click.command(short_help="Compare protocols on problems: a table and a picture.")
+@click.command(
+    cls=SectionedCommand, sections=_SECTIONS, short_help="Compare protocols on problems: a table and a picture."
+)
 @click.argument("problem", nargs=-1, required=True, metavar="PATH ...|FAMILY [NAME=VALUE ...]")
 @click.option("--protocols", required=True, metavar="NAME,NAME,...", help="The protocols.")
 @click.option(
