@@ -2,7 +2,7 @@
 
 A craft's cell and level are derived from the first applicable source: the coordinates of its topic under the
 assignment; the two numbers at the end of its name (`Robot3.1`, `V3.1`), with its first value as the level; its first
-value alone.
+value alone. Coordinates over real variables are not whole numbers: such a craft is not bound to cells.
 """
 
 from __future__ import annotations
@@ -13,18 +13,17 @@ from dataclasses import field, replace
 from itertools import product, zip_longest
 from math import prod
 
-from robochoc.model.expression import Expression, UndefinedValueError, evaluate, names
-from robochoc.model.problem import Assignment, Robot, Topic
+from robochoc.model.expression import names
+from robochoc.model.problem import Assignment, Domain, Robot, Topic, Variable
+from robochoc.model.waypoints import position, value_as_coordinate
 from robochoc.system.lazy_dataclass import dataclass
 
-Cell = tuple[int, int]
-"""Row and column, or the x and y of a topic."""
+Cell = tuple[float, float]
+"""Row and column, or the x and y of a topic. They are integers, unless they depend on real variables."""
 
 # Longer numbers are dates or serial numbers, not rows or columns.
 _ROW_AND_COLUMN = re.compile(r"(?<![0-9])([0-9]{1,4})[._,:;-]([0-9]{1,4})$")
 
-_COORDINATE_MAX = 10**300
-"""The largest coordinate: larger numbers exceed the range of floats, and are clamped."""
 _DECISIONS_MAX = 1_000
 """The possible places of a robot with more decisions are not listed."""
 
@@ -35,13 +34,18 @@ class Craft:
 
     name: str
     cell: Cell | None = None
-    level: int | None = None
+    level: float | None = None
     robot: str = ""
     """The robot that decides about the craft; empty if only a variable is known."""
     topic: Topic | None = None
     """The topic of its waypoints, if its file has one."""
     decided_by: tuple[str, ...] = field(default=(), compare=False)
     """The variables on which its place depends."""
+
+    @property
+    def is_exact(self) -> bool:
+        """True if its place depends on real variables, and must not be moved to a cell."""
+        return bool(self.topic and self.topic.places)
 
 
 def row_and_column(name: str) -> Cell | None:
@@ -52,20 +56,19 @@ def row_and_column(name: str) -> Cell | None:
 
 def craft_of_variable(variable: str, values: Assignment) -> Craft:
     """Return the craft of `variable`, whose robot is not known."""
-    return _craft(variable, [variable], None, values)
+    return _craft(variable, [Variable(variable, Domain("", ()))], None, values)
 
 
 def crafts_of(robot: Robot, values: Assignment) -> list[Craft]:
     """Return one craft per topic with coordinates, else one per variable that names a cell, else one for the robot."""
-    own = [variable.name for variable in robot.variables]
+    own = robot.variables
     topics = [topic for topic in robot.topics if topic.x is not None and topic.y is not None]
     if len(topics) > 1:
         named = zip(_short_names(topics), topics, strict=True)
         crafts = [_craft(name, own, topic, values) for name, topic in named]
-    elif not topics and len(own) > 1 and all(row_and_column(name) for name in own):
+    elif not topics and len(own) > 1 and all(row_and_column(one.name) for one in own):
         topics = [topic for topic in robot.topics[: len(own)] if len(robot.topics) == len(own)]
-        named_topics = zip_longest(own, topics)
-        crafts = [_craft(name, [name], topic, values) for name, topic in named_topics]
+        crafts = [_craft(one.name, [one], topic, values) for one, topic in zip_longest(own, topics)]
     else:
         topics = topics or [*robot.topics[:1]]
         crafts = [_craft(robot.name, own, topics[0] if topics else None, values)]
@@ -80,45 +83,25 @@ def possible_crafts(robot: Robot) -> Iterator[Craft]:
             yield from crafts_of(robot, dict(zip(names, decided, strict=True)))
 
 
-def _craft(name: str, variables: Sequence[str], topic: Topic | None, values: Assignment) -> Craft:
+def _craft(name: str, variables: Sequence[Variable], topic: Topic | None, values: Assignment) -> Craft:
     """Return the craft `name`. Its cell is from its topic, else from its name, or the name of its first variable."""
-    named = (row_and_column(one) for one in (name, *variables[:1]))
-    cells = [_cell_of(topic, values) if topic else None, *named]
-    known = [values[own] for own in variables if own in values]
-    level = None
-    if known:
-        height = _value(topic.z, values) if topic else None
-        level = _bounded(known[0]) if height is None else height
+    x, y, height = position(topic, values) if topic else (None, None, None)
+    named = (row_and_column(one) for one in (name, *(one.name for one in variables[:1])))
+    cells = [None if x is None or y is None else (x, y), *named]
+    level = value_as_coordinate(variables, values)
+    if level is not None and height is not None:
+        level = height
     decided_by = _decided_by(topic, variables)
     return Craft(name, next(filter(None, cells), None), level, topic=topic, decided_by=decided_by)
 
 
-def _decided_by(topic: Topic | None, variables: Sequence[str]) -> tuple[str, ...]:
+def _decided_by(topic: Topic | None, variables: Sequence[Variable]) -> tuple[str, ...]:
     """Return the variables in the coordinates of `topic`, and the variable of the level if the topic has no z."""
     across = [topic.x, topic.y] if topic else []
     height = topic.z if topic else None
     given = [*(across if None not in across else []), height]
     found = [name for expression in given if expression is not None for name in names(expression)]
-    return tuple(dict.fromkeys([*found, *(variables[:1] if height is None else [])]))
-
-
-def _cell_of(topic: Topic, values: Assignment) -> Cell | None:
-    x, y = _value(topic.x, values), _value(topic.y, values)
-    return None if x is None or y is None else (x, y)
-
-
-def _value(expression: Expression | None, values: Assignment) -> int | None:
-    """Return the value of `expression`; None if it is undefined, or a variable has no value."""
-    if expression is None:
-        return None
-    try:
-        return _bounded(evaluate(expression, values))
-    except (UndefinedValueError, KeyError):
-        return None
-
-
-def _bounded(value: int) -> int:
-    return max(-_COORDINATE_MAX, min(value, _COORDINATE_MAX))
+    return tuple(dict.fromkeys([*found, *(one.name for one in variables[:1] if height is None)]))
 
 
 def _short_names(topics: Sequence[Topic]) -> list[str]:

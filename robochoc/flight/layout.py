@@ -51,10 +51,10 @@ class BoxAxis:
     unit_m: float | None = None
 
     @classmethod
-    def spanning(cls, name: str, values: Iterable[int], *, most: int, scaled: int) -> BoxAxis:
+    def spanning(cls, name: str, values: Iterable[float], *, most: int, scaled: int) -> BoxAxis:
         """Return an axis for `values`: one cell per number if there are at most `most`, else `scaled` cells."""
         found = [*values] or [1]
-        first, last = min(found), max(found)
+        first, last = math.floor(min(found)), math.ceil(max(found))
         if last - first < most:
             low = first if abs(first) < _FAR else 1
             return cls(name, low, low + last - first, first, last)
@@ -68,13 +68,13 @@ class BoxAxis:
     def at(self, value: float) -> float:
         """Return the cell of `value`."""
         if self._is_even:
-            return float(self.low + value - self.first)
+            return value + float(self.low - self.first)
         return self.low + (value - self.first) * (self.high - self.low) / (self.last - self.first)
 
     def value(self, cell: float) -> float:
         """Return the value at `cell`: the inverse of `at`."""
         if self._is_even:
-            return cell - self.low + self.first
+            return cell - (self.low - self.first)
         return self.first + (cell - self.low) * (self.last - self.first) / (self.high - self.low)
 
     @property
@@ -135,7 +135,7 @@ class MissionLayout:
     def places(self, crafts: Sequence[Craft], *, exact: bool = False) -> list[Point | None]:
         """Return the goals of the crafts in the order of `homes`; None for a craft without a level.
 
-        Places too close to each other are moved apart, unless they are `exact`.
+        Places too close to each other are moved apart, unless they are `exact`, or depend on real variables.
         """
         taken = _OccupiedPoints()
         around: dict[Point, Iterator[Point]] = {}
@@ -147,7 +147,8 @@ class MissionLayout:
                 here = (rows.at(craft.cell[0]), columns.at(craft.cell[1])) if craft.cell else (x, y)
                 middle = (*here, levels.at(craft.level))
                 spots = around.setdefault(middle, _spiral(middle))
-                place = middle if exact else next(spot for spot in spots if not taken.is_near(spot))
+                is_fixed = exact or craft.is_exact
+                place = middle if is_fixed else next(spot for spot in spots if not taken.is_near(spot))
                 taken.add(place)
             found.append(place)
         return found

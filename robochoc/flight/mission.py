@@ -247,8 +247,8 @@ class MissionBuilder:
                 yield craft_of_variable(name, values) if name in values else Craft(name, row_and_column(name))
 
     def _drone(self, craft: Craft, home: Point) -> Drone:
-        group = craft.cell[0] if craft.cell and not self._ground else round(self.layout.axes[0].value(home[0]))
-        return Drone(craft.name, craft.robot, craft.topic, self._metres(home), group)
+        row = craft.cell[0] if craft.cell and not self._ground else self.layout.axes[0].value(home[0])
+        return Drone(craft.name, craft.robot, craft.topic, self._metres(home), round(row))
 
     def _landing_point(self, number: int) -> Point:
         if number not in self._landing_points:

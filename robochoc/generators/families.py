@@ -31,6 +31,7 @@ from robochoc.generators.graph_choice import GraphChoice
 from robochoc.generators.maps import coverage as coverages
 from robochoc.generators.maps import formation as formations
 from robochoc.generators.maps import patrol as patrols
+from robochoc.generators.maps import swarm_on_map as map_swarms
 from robochoc.generators.maps.map_team import MapChoice
 from robochoc.model.allocation import Distance
 from robochoc.model.cost_units import CostUnits
@@ -226,6 +227,21 @@ def patrol(
     return team
 
 
+def swarm_on_map(
+    *,
+    map: str,  # noqa: A002 - the name of the option
+    agents: int,
+    at: str = "",
+    radius: float = 0.2,
+    speed: float = 0.5,
+    points: int = swarms.POINTS,
+    seed: int = 0,
+) -> Team:
+    """Return a swarm of drones with real positions on a map: see `generators/maps/swarm_on_map.py`."""
+    team, _ = map_swarms.swarm_on_map(map, agents=agents, at=at, radius=radius, speed=speed, points=points, seed=seed)
+    return team
+
+
 FAMILIES: Mapping[str, Callable[..., Team]] = MappingProxyType(
     {
         "agentsnet": agentsnet,
@@ -246,6 +262,7 @@ FAMILIES: Mapping[str, Callable[..., Team]] = MappingProxyType(
         "smart-grid": grids.smart_grid,
         "smart-homes": lightings.smart_homes,
         "swarm": swarms.swarm,
+        "swarm-on-map": swarm_on_map,
         "tasks": tasks,
         "tracking": trackings.tracking,
     }

@@ -6,17 +6,28 @@ the IEEE 95, 2007) and in experiments with functional DCOPs (Choudhury, Mahmud a
 
 from __future__ import annotations
 
-from robochoc.generators.draws import MAX_NODES, check_bounds, random_integer, seeded
-from robochoc.model.assembly import assemble
+from collections.abc import Iterable
+from decimal import Decimal
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+from robochoc.generators.draws import MAX_NODES, check_bounds, limited, random_integer, seeded
+from robochoc.model.assembly import Extras, assemble
 from robochoc.model.constraint import Constraint, Domain, Function, Predicate, Variable
 from robochoc.model.cost_units import CostUnits
-from robochoc.model.expression import Type, parse
+from robochoc.model.expression import Constant, Name, Type, parse
 from robochoc.model.expression.fixed_point import VALUE_PLACES, fixed_point
-from robochoc.model.problem import ProblemKind, Team
+from robochoc.model.problem import ProblemKind, Team, Topic
 from robochoc.model.real import RealInterval, RealParameters, grid
+
+if TYPE_CHECKING:
+    from robochoc.maps.reachability.free_area import Rectangle
 
 PLACES = 2
 MOST_SIDE = 1000
+POINTS = 9
+HEIGHT = 1
+"""The height of all waypoints in metres."""
 
 
 def swarm(*, agents: int, side: int = 10, points: int = 9, seed: int = 0) -> Team:
@@ -38,23 +49,84 @@ def swarm(*, agents: int, side: int = 10, points: int = 9, seed: int = 0) -> Tea
     check_bounds({"agents": (agents, 1, MAX_NODES), "side": (side, 2, MOST_SIDE), "points": (points, 2, MOST_SIDE)})
     chance = seeded(seed)
     most = side * 10**PLACES
-    domain = Domain("Side", grid(0, most, points), real=RealInterval(0, most, PLACES))
-    apart = _predicate("apart", ("X1", "Y1", "X2", "Y2"), "ge(sqr(X1 - X2) + sqr(Y1 - Y2), 0.25)")
-    owned, constraints = {}, []
+    domain = real_domain("Side", 0, most, points)
+    drones = Drones()
     for drone in range(1, agents + 1):
-        owned[f"Robot{drone}"] = [Variable(f"x{drone}", domain), Variable(f"y{drone}", domain)]
-        own = (f"x{drone}", f"y{drone}")
-        a, b = (_decimal(random_integer(chance, 0, most)) for _ in range(2))
-        home = _function(f"home{drone}", ("X", "Y"), f"(sqr(X - {a}) + sqr(Y - {b})) * 0.1")
-        constraints.append(Constraint(home.name, home, own, own))
+        home = (random_integer(chance, 0, most), random_integer(chance, 0, most))
+        drones.add(drone, (domain, domain), home)
         if drone > 1:
-            above = drone // 2
-            a, b = (_decimal(random_integer(chance, -most // 4, most // 4)) for _ in range(2))
-            keep = _function(f"keep{drone}", apart.parameters, f"sqr(X2 - X1 - {a}) + sqr(Y2 - Y1 - {b})")
-            scope = (f"x{above}", f"y{above}", *own)
-            constraints += [Constraint(keep.name, keep, scope, scope), Constraint(f"apart{drone}", apart, scope, scope)]
-    name = f"swarm-{agents}-{side}" + f"-{points}" * (points != 9) + f"-{seed}"  # noqa: PLR2004 - the default
-    return assemble(name, owned, constraints, kind=ProblemKind.DISWCSP, costs=CostUnits(places=VALUE_PLACES))
+            drones.keep(drone, (random_integer(chance, -most // 4, most // 4) for _ in range(2)))
+    return drones.team(f"swarm-{agents}-{side}" + f"-{points}" * (points != POINTS) + f"-{seed}")
+
+
+def real_domain(name: str, low: int, high: int, points: int) -> Domain:
+    """Return the domain of coordinates from `low` to `high`, in hundredths, with a grid of some points."""
+    return Domain(name, grid(low, high, points), real=RealInterval(low, high, PLACES))
+
+
+class Drones:
+    """The variables, waypoints and constraints of drones with real positions. Lengths are in hundredths of a metre."""
+
+    def __init__(self) -> None:
+        self._owned: dict[str, list[Variable]] = {}
+        self._topics: dict[str, tuple[Topic]] = {}
+        self._constraints: list[Constraint] = []
+        self._apart = _predicate("apart", ("X1", "Y1", "X2", "Y2"), "ge(sqr(X1 - X2) + sqr(Y1 - Y2), 0.25)")
+
+    def add(
+        self, drone: int, domains: tuple[Domain, Domain], home: tuple[int, int], outside: Iterable[Rectangle] = ()
+    ) -> None:
+        """Add a drone with its home, outside of some rectangles in metres."""
+        own = _position_of(drone)
+        self._owned[f"Robot{drone}"] = [Variable(name, domain) for name, domain in zip(own, domains, strict=True)]
+        self._topics[f"Robot{drone}"] = (_waypoint(f"/robot{drone}/waypoint", own),)
+        a, b = map(_decimal, home)
+        near = _function(f"home{drone}", ("X", "Y"), f"(sqr(X - {a}) + sqr(Y - {b})) * 0.1")
+        self._constraints.append(Constraint(near.name, near, own, own))
+        for number, rectangle in enumerate(outside, 1):
+            free = _predicate(f"free{drone}.{number}", ("X", "Y"), _is_outside(rectangle))
+            self._constraints.append(Constraint(free.name, free, own, own))
+
+    def keep(self, drone: int, displacement: Iterable[int]) -> None:
+        """Add the displacement of a drone from the drone above it, and the distance between both."""
+        a, b = map(_decimal, displacement)
+        keep = _function(f"keep{drone}", self._apart.parameters, f"sqr(X2 - X1 - {a}) + sqr(Y2 - Y1 - {b})")
+        scope = (*_position_of(drone // 2), *_position_of(drone))
+        self._constraints.append(Constraint(keep.name, keep, scope, scope))
+        self._constraints.append(Constraint(f"apart{drone}", self._apart, scope, scope))
+
+    def team(self, name: str) -> Team:
+        """Return the team of all drones."""
+        costs = CostUnits(places=VALUE_PLACES)
+        extras = Extras(topics=self._topics)
+        return assemble(
+            name, self._owned, limited(self._constraints), kind=ProblemKind.DISWCSP, costs=costs, extras=extras
+        )
+
+
+def _position_of(drone: int) -> tuple[str, str]:
+    return f"x{drone}", f"y{drone}"
+
+
+def _waypoint(name: str, own: tuple[str, str]) -> Topic:
+    sources = (Name(own[0]), Name(own[1]), Constant(HEIGHT))
+    x, y, z = (fixed_point(one, own, PLACES, Type.INTEGER, VALUE_PLACES) for one in sources)
+    return Topic(name, x=x, y=y, z=z, sources=sources, places=VALUE_PLACES)
+
+
+def _is_outside(rectangle: Rectangle) -> str:
+    """Return the condition for a position outside of a rectangle, or on its border."""
+    far = []
+    for name, (low, high) in zip("XY", rectangle, strict=True):
+        middle, half = ((low + high) / 2, (high - low) / 2)
+        far.append(f"ge(abs({name} - {_exact(middle)}), {_exact(half)})")
+    return f"or({', '.join(far)})"
+
+
+def _exact(number: Fraction) -> str:
+    """Return a number as a decimal; the corners of pixels have few decimal places."""
+    digits = Decimal(number.numerator) / number.denominator
+    return f"{digits:f}"
 
 
 def _decimal(hundredths: int) -> str:

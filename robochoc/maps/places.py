@@ -10,15 +10,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from robochoc.model.expression import Apply, Expression, UndefinedValueError, evaluate, names
+from robochoc.model.expression import Apply, Expression, names
 from robochoc.model.problem import Robot, Team
+from robochoc.model.waypoints import coordinate
 
 if TYPE_CHECKING:
     from robochoc.maps.ground_map import GroundMap
 
 Place = tuple[float, ...]
 """The x and y of a place, and the z on a three-dimensional map, in metres."""
-_Formulas = tuple[Expression, ...]
+_Formulas = tuple[tuple[Expression, int], ...]
+"""The expression of each coordinate, and its decimal places."""
 _VALUES_MAX = 1_000_000
 """In teams whose variables have more values in total, only variables of waypoints have places."""
 _PLACES = 6
@@ -48,11 +50,10 @@ class MapPlaces:
         for name, value in assignment.items():
             if name in self._formulas and self._scale is not None:
                 variable, formulas = self._formulas[name]
-                try:
-                    cell = [evaluate(one, {variable: value}) for one in formulas]
-                    found[name] = tuple(round(part * self._scale, _PLACES) + 0.0 for part in cell)
-                except (UndefinedValueError, OverflowError):
-                    continue
+                cell = [coordinate(one, places, {variable: value}) for one, places in formulas]
+                known = [round(part * self._scale, _PLACES) + 0.0 for part in cell if part is not None]
+                if len(known) == len(cell):
+                    found[name] = tuple(known)
         return found
 
     def _later_visits(self, team: Team) -> Iterator[tuple[str, tuple[str, _Formulas]]]:
@@ -64,7 +65,7 @@ class MapPlaces:
         for robot in team.robots:
             own = [variable.name for variable in robot.variables]
             found = [self._formulas[name] for name in own if name in self._formulas]
-            found = [one for one in found if not any(map(_has_cases, one[1]))]  # cases are about one task
+            found = [one for one in found if not _has_cases(one[1])]  # cases are about one task
             for name in own if len(found) == 1 else ():
                 if name not in self._formulas and known.issuperset(domains[name]):
                     yield name, found[0]
@@ -74,13 +75,18 @@ def _waypoints(robot: Robot, *, has_height: bool) -> Iterator[tuple[str, tuple[s
     """Yield each variable of a robot that alone determines a waypoint, with the formulas of the waypoint."""
     own = {variable.name for variable in robot.variables}
     for topic in robot.topics:
-        formulas = tuple(part for part in (topic.x, topic.y, topic.z)[: 3 if has_height else 2] if part is not None)
-        over = {name for part in formulas for name in names(part)}
+        given = (topic.x, topic.y, topic.z)[: 3 if has_height else 2]
+        formulas = tuple((part, topic.places) for part in given if part is not None)
+        over = {name for part, _ in formulas for name in names(part)}
         if len(formulas) == (3 if has_height else 2) and len(over) == 1 and over <= own:
             (name,) = over
             yield name, (name, formulas)
 
 
-def _has_cases(formula: Expression) -> bool:
-    """Return whether a formula distinguishes cases, and is thus about the values of its own variable only."""
-    return isinstance(formula, Apply) and (formula.operator == "if" or any(map(_has_cases, formula.arguments)))
+def _has_cases(formulas: _Formulas) -> bool:
+    """Return whether formulas distinguish cases, and are thus about the values of their own variable only."""
+    return any(_is_conditional(part) for part, _ in formulas)
+
+
+def _is_conditional(formula: Expression) -> bool:
+    return isinstance(formula, Apply) and (formula.operator == "if" or any(map(_is_conditional, formula.arguments)))

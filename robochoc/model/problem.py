@@ -92,8 +92,8 @@ class ProblemKind(StrEnum):
 class Topic:
     """A topic on which a robot's decision is published (ROS Layer unit).
 
-    `x`, `y`, `z` are the waypoint's position, in whole numbers. `sources` are the expressions over real variables from
-    which they were made, if the robot has such variables.
+    `x`, `y`, `z` are the waypoint's position, in units of 10**-`places` (`waypoints.position`). `sources` are the
+    expressions over real variables from which they were made, if the robot has such variables.
     """
 
     name: str
@@ -102,6 +102,7 @@ class Topic:
     y: Expression | None = None
     z: Expression | None = None
     sources: tuple[Expression | None, ...] = field(default=(), compare=False)
+    places: int = 0
 
 
 @dataclass(frozen=True)

@@ -25,8 +25,9 @@ from robochoc.flight.reports import (
     Report,
 )
 from robochoc.formats.diagnostics import on_one_line, shortened
-from robochoc.model.expression import Expression, Name, UndefinedValueError, evaluate, names
-from robochoc.model.problem import AddValue, Assignment, Change, Domain, RemoveAgent, RemoveValue, Robot, Team
+from robochoc.model.expression import Expression, Name, names
+from robochoc.model.problem import AddValue, Assignment, Change, Domain, RemoveAgent, RemoveValue, Robot, Team, Topic
+from robochoc.model.waypoints import coordinate
 from robochoc.robots.fixed_decision import changes_of_fixed
 from robochoc.system.lazy_dataclass import dataclass
 
@@ -221,10 +222,10 @@ def _may_reach(craft: Craft, home: Point | None, place: Point) -> bool:
     topic = craft.topic
     across: list[float | None] = [None, None]
     if topic and topic.x is not None and topic.y is not None:
-        across = [_fixed(topic.x), _fixed(topic.y)]
+        across = [_fixed(topic.x, topic), _fixed(topic.y, topic)]
     elif craft.cell or home:
         across = [*(craft.cell or (home or ())[:2])]
-    fixed = [*across, _fixed(topic.z) if topic else None]
+    fixed = [*across, _fixed(topic.z, topic) if topic else None]
     return all(at is None or abs(at - there) <= WITHIN + _HAIR for at, there in zip(fixed, place, strict=True))
 
 
@@ -235,20 +236,15 @@ def _candidates(craft: Craft, variable: str, domain: Domain, place: Point) -> It
     if given[2] is None:
         given[2] = Name(variable)
     for expression, at in zip(given, place, strict=True):
-        if expression == Name(variable):
+        if expression == Name(variable) and not domain.real:
             around = range(math.ceil(at - WITHIN - _HAIR), math.floor(at + WITHIN + _HAIR) + 1)
             return [value for value in around if value in domain]
     return domain if sum(len(part) for part in domain.ranges) <= VALUES_MAX else None
 
 
-def _fixed(expression: Expression | None) -> int | None:
-    """Return the value of `expression`; None if it contains a variable, or is undefined."""
-    if expression is None or names(expression):
-        return None
-    try:
-        return evaluate(expression, {})
-    except UndefinedValueError:
-        return None
+def _fixed(expression: Expression | None, topic: Topic) -> float | None:
+    """Return the coordinate `expression` of a topic; None if it contains a variable, or is undefined."""
+    return None if expression is None or names(expression) else coordinate(expression, topic.places, {})
 
 
 def _in_units(place: Point, scale: float) -> Point:

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from robochoc.flight.mission import Mission, in_cells
+from robochoc.maps.occupancy.rectangles import few_rectangles
 from robochoc.maps.walls import PixelFrame, VoxelFrame
 from robochoc.system.lazy_dataclass import dataclass
 from robochoc.view.meshes import TriangleMesh
@@ -29,7 +30,6 @@ _MOST_RECTANGLES = 4_000
 """The maximum number of rectangles for a map. If there are more, the size of pixels is doubled until it is met."""
 
 Corners = npt.NDArray[np.float64]
-Numbers = npt.NDArray[np.int64]
 _Cells = npt.NDArray[np.int64]
 
 
@@ -49,7 +49,7 @@ def wall_footprints(mission: Mission) -> DrawnWalls | None:
         return None
 
     def footprints(flags: Flags) -> Corners:
-        sides, factor = few_rectangles(flags)
+        sides, factor = few_rectangles(flags, _MOST_RECTANGLES)
         left, low, right, high = factor * sides.T
         corners = np.stack([left, low, right, low, right, high, left, high], axis=1).reshape(-1, 2)
         rows, columns = flags.shape
@@ -58,34 +58,6 @@ def wall_footprints(mission: Mission) -> DrawnWalls | None:
         return in_cells(mission, flat)[:, :2].reshape(-1, 4, 2)
 
     return DrawnWalls(footprints(walls.occupied), footprints(walls.unknown))
-
-
-def few_rectangles(flags: Flags, most: int = _MOST_RECTANGLES) -> tuple[Numbers, int]:
-    """Return at most `most` rectangles that cover the set flags, and the length of their unit in pixels."""
-    factor = 1
-    while len(found := rectangles(flags)) > most:
-        factor *= 2
-        rows, columns = flags.shape
-        even = np.pad(flags, ((0, rows % 2), (0, columns % 2)))
-        flags = even[::2, ::2] | even[1::2, ::2] | even[::2, 1::2] | even[1::2, 1::2]
-    return found, factor
-
-
-def rectangles(flags: Flags) -> Numbers:
-    """Return rectangles (K, 4) that cover exactly the set flags: the least x and y, and the first x and y beyond.
-
-    Consecutive pixels in a row are merged, and then equal runs in consecutive rows.
-    """
-    steps = np.diff(np.pad(flags, ((0, 0), (1, 1))).astype(np.int8), axis=1)
-    row, begin = np.nonzero(steps == 1)
-    end = np.nonzero(steps == -1)[1]
-    order = np.lexsort((row, end, begin))
-    row, begin, end = row[order], begin[order], end[order]
-    new = np.ones(len(row), dtype=bool)
-    new[1:] = (np.diff(begin) != 0) | (np.diff(end) != 0) | (np.diff(row) != 1)
-    first = np.flatnonzero(new)
-    last = np.append(first[1:], len(row)) - 1 if len(first) else first
-    return np.column_stack((begin[first], row[first], end[first], row[last] + 1)).astype(np.int64)
 
 
 def wall_faces(mission: Mission, most: int = _MOST_FACES) -> Faces | None:

@@ -29,7 +29,7 @@ def _cells_in_files(robots: Sequence[Robot]) -> list[Cell] | None:
     if not all(map(has_place, robots)):
         return None
     found = [craft.cell for robot in robots for craft in crafts_of(robot, {})[:1]]
-    said = [cell for cell in found if cell is not None]
+    said = [(round(cell[0]), round(cell[1])) for cell in found if cell is not None]
     if len(set(said)) < len(robots):
         return None
     left, bottom = min((x for x, _ in said), default=0), min((y for _, y in said), default=0)

@@ -41,6 +41,11 @@ class FreeSpace:
         """The pixels in which the robot can be."""
         return np.asarray(self._by_pixel.any(axis=(1, 3)))
 
+    @property
+    def is_whole(self) -> Flags:
+        """The pixels in which the robot can be at all points of the lattice."""
+        return np.asarray(self._by_pixel.all(axis=(1, 3)))
+
     @cached_property
     def joined(self) -> tuple[Flags, Flags]:
         """The pixels from which the robot can move directly to the next row, and to the next column."""

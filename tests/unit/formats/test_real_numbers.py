@@ -17,6 +17,7 @@ from robochoc.model.expression import Apply, Constant, Expression, ExpressionErr
 from robochoc.model.expression.fixed_point import fixed_point
 from robochoc.model.expression.tree import DECIMAL
 from robochoc.model.problem import RemoveValue, Team
+from robochoc.model.waypoints import position
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
 from tests.support.cases import looped
@@ -94,13 +95,10 @@ def test_results_contain_numbers_and_are_read_back(tmp_path: Path) -> None:
     assert outcome.labelled(outcome.assignment)["x"] == 2.5
 
 
-def test_coordinates_are_whole_numbers(tmp_path: Path) -> None:
-    topic = '<topics><topic name="/a" x="mul(x, 100)" y="x"/></topics><functions>'
+def test_coordinates_are_exact(tmp_path: Path) -> None:
+    topic = '<topics><topic name="/a" x="mul(x, 100)" y="x" z="2"/></topics><functions>'
     team = _team(tmp_path / "t", A.replace("<functions>", topic, 1))
-    x, y = team["A"].topics[0].x, team["A"].topics[0].y
-    assert x is not None
-    assert y is not None
-    assert (evaluate(x, {"x": 2345}), evaluate(y, {"x": 2345})) == (234, 2)
+    assert position(team["A"].topics[0], {"x": 2345}) == (234.5, 2.345, 2)
     write_team(team, tmp_path / "copy" / "t")
     assert read_team(tmp_path / "copy" / "t") == team
 

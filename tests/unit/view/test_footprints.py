@@ -10,9 +10,10 @@ import pytest
 
 from robochoc.flight.layout import BoxAxis
 from robochoc.flight.mission import Mission
+from robochoc.maps.occupancy.rectangles import few_rectangles, rectangles
 from robochoc.maps.walls import VoxelFrame, Walls
 from robochoc.view.meshes import prisms
-from robochoc.view.walls import Flags, faces, few_rectangles, rectangles, wall_faces
+from robochoc.view.walls import Flags, faces, wall_faces
 from tests.support.examples import count
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from robochoc.cli.commands.generate.binary import agentsnet, coloring, ising, random_problem
-from robochoc.cli.commands.generate.maps import coverage, formation, patrol
+from robochoc.cli.commands.generate.maps import coverage, formation, patrol, swarm_on_map
 from robochoc.cli.commands.generate.missions import grid_sensors, meetings, sensors, tasks, tracking
 from robochoc.cli.commands.generate.networks import (
     frequencies,
@@ -51,6 +51,7 @@ for family in (
     smart_homes,
     stochastic,
     swarm,
+    swarm_on_map,
     tasks,
     tracking,
 ):

@@ -1,4 +1,4 @@
-"""`robochoc generate formation`, `coverage` and `patrol`: problems on a map with walls."""
+"""`robochoc generate formation`, `coverage`, `patrol` and `swarm-on-map`: problems on a map with walls."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def formation(**problem: Any) -> TeamOnMap:  # noqa: ANN401 - `formation`'s own
 
     \b
     robochoc generate formation --map building.yaml --agents 4 --shape wedge --anchor 3,2
-    """  # noqa: D301 - \\b keeps click from wrapping the lines
+    """  # noqa: D301 - \b keeps click from wrapping the lines
     from robochoc.generators.maps.formation import formation as on_map
 
     return on_map(pop_map_choice(problem), **problem)
@@ -156,7 +156,7 @@ def coverage(**problem: Any) -> TeamOnMap:  # noqa: ANN401 - `coverage`'s own
 
     \b
     robochoc generate coverage --map building.yaml --agents 3 --cells 40 --within 12
-    """  # noqa: D301 - \\b keeps click from wrapping the lines
+    """  # noqa: D301 - \b keeps click from wrapping the lines
     from robochoc.generators.maps.coverage import coverage as on_map
 
     return on_map(pop_map_choice(problem), **problem)
@@ -189,7 +189,34 @@ def patrol(**problem: Any) -> TeamOnMap:  # noqa: ANN401 - `patrol`'s own
     \b
     robochoc generate patrol --map building.yaml --agents 3 --points 8
     robochoc generate patrol --map building.yaml --agents 2 --points 6 --rounds 2
-    """  # noqa: D301 - \\b keeps click from wrapping the lines
+    """  # noqa: D301 - \b keeps click from wrapping the lines
     from robochoc.generators.maps.patrol import patrol as on_map
 
     return on_map(pop_map_choice(problem), **problem)
+
+
+@click.command("swarm-on-map", short_help="On a map: drones choose real positions.")
+@click.option(
+    "--map", "map", type=InputPath(), required=True, metavar="FILE", help="Map of ROS's map_server (YAML file)."
+)
+@number_option("--agents", "Number of drones.", most=MAX_ROBOTS)
+@click.option(
+    "--at", default="", metavar="'X,Y X,Y'", help="Starts of the drones, in metres.  [default: random, 1 m apart]"
+)
+@measure_option("--radius", "Radius of a drone, which is also its minimum distance from walls.", 0.2)
+@measure_option("--speed", "Speed of drones, in metres per second.", 0.5, "M/S")
+@number_option("--points", "Points of the first grid along the longer side.", least=2, most=1000, default=9)
+@seed_option
+@writes_team("swarm-MAP-AGENTS[-POINTS]-SEED")
+def swarm_on_map(**problem: Any) -> TeamOnMap:  # noqa: ANN401 - `swarm_on_map`'s own
+    """Drones on a map choose real positions near their homes, and in a formation with their neighbours.
+
+    Positions are outside of walls, and can be reached from the drone's start. Costs are squares of distances, as in
+    `robochoc generate swarm`. Robot3 has the variables x3 and y3, in metres with a precision of 0.01.
+
+    \b
+    robochoc generate swarm-on-map --map building.yaml --agents 4
+    """  # noqa: D301 - \b keeps click from wrapping the lines
+    from robochoc.generators.maps.swarm_on_map import swarm_on_map as on_map
+
+    return on_map(str(problem.pop("map")), **problem)
