@@ -327,8 +327,8 @@ def _values(robots: Sequence[Robot], place: int, span: float | None = None) -> d
     """Return the least (`place` 0) or greatest (-1) value of each variable whose domain is no wider than `span`."""
     found = {}
     for variable in (variable for robot in robots for variable in robot.variables):
-        ranges = variable.domain.ranges
-        if ranges and (span is None or ranges[-1][-1] - ranges[0][0] <= span):
+        ranges, real = variable.domain.ranges, variable.domain.real
+        if ranges and (span is None or ranges[-1][-1] - ranges[0][0] <= span * 10 ** (real.places if real else 0)):
             found[variable.name] = ranges[place][place]
     return found
 

@@ -51,9 +51,9 @@ def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_
     """Simulate the flight of a result that 'robochoc solve' saved with --json or --journal.
 
     In each epoch the drones fly to their positions at a safe distance from each other; drones of withdrawn robots land
-    at the edge. Teams of 'generate formation', 'coverage' and 'patrol' fly around the walls of their map. --ros
-    publishes the waypoints of each epoch, and all poses 20 times a second of simulated time. The exit status is 4 if a
-    drone did not arrive, fell, or came too close to another drone or a wall.
+    at the edge. Teams that were generated on a map fly around its walls. --ros publishes the waypoints of each epoch,
+    and all poses 20 times a second of simulated time. The exit status is 4 if a drone did not arrive, fell, or came too
+    close to another drone or a wall.
 
     \b
     robochoc solve instances/queens3d-4 --withdraw --json > out/result.json

@@ -1,7 +1,7 @@
 """Swarms on a map: drones that choose real positions in the free space, outside of walls.
 
-The costs are those of `generators/swarm.py`. Each pixel in which a drone does not fit everywhere, or which it cannot
-reach from its start, is forbidden by a hard constraint.
+The costs are those of `generators/swarm.py`, but displacements are near those between homes, so that the formation fits
+on the map. Hard constraints forbid each pixel in which a drone does not fit everywhere, or which it cannot reach.
 """
 
 from __future__ import annotations
@@ -26,10 +26,12 @@ from robochoc.maps.reachability.free_area import Rectangle, bounds_of, forbidden
 from robochoc.maps.reachability.free_space import free_space
 from robochoc.maps.reachability.ground import ground_on
 from robochoc.maps.reachability.reachability import squared, start_pixel
-from robochoc.model.problem import Team
+from robochoc.model.problem import Domain, Team
 
 _APART_M = 1
-"""The minimum distance between random starts."""
+"""The minimum distance between random starts, and between homes."""
+_DEVIATION = 100
+"""The largest deviation of a displacement from that between homes, for x and y, in hundredths of a metre."""
 _TRIES = 10_000
 _UNIT = 10**PLACES
 
@@ -72,19 +74,15 @@ def swarm_on_map(
         raise ValueError(f"no pixel is free for a robot of the radius {radius:g} m; use a smaller radius")
     chance = seeded(seed)
     starts = starts or _random_starts(cells.grid, free, agents, chance)
-    drones = Drones()
+    drones, homes = Drones(), list[tuple[int, int]]()
     areas = list(_areas(cells, free, starts))
-    longest = max(high - low for area in areas for low, high in area.spans)
+    step = max(area.length for area in areas) / (points - 1)
     for drone, area in enumerate(areas, 1):
-        domains = tuple(
-            real_domain(f"{axis}{drone}", *span, max(2, ceil(points * (span[1] - span[0]) / longest)))
-            for axis, span in zip("XY", area.spans, strict=True)
-        )
-        drones.add(drone, (domains[0], domains[1]), area.random_place(chance), area.forbidden)
+        homes.append(area.random_place(chance, homes))
+        drones.add(drone, area.domains(drone, step), homes[-1], area.forbidden)
         if drone > 1:
-            drones.keep(
-                drone, [random_integer(chance, (low - high) // 4, (high - low) // 4) for low, high in area.spans]
-            )
+            apart = (own - above for own, above in zip(homes[-1], homes[drone // 2 - 1], strict=True))
+            drones.keep(drone, [part + random_integer(chance, -_DEVIATION, _DEVIATION) for part in apart])
     named = {f"Robot{number}": start for number, start in enumerate(starts, 1)}
     name = f"swarm-{label_of(map)}-{agents}" + f"-{points}" * (points != POINTS) + f"-{seed}"
     return drones.team(name), ground_on(cells, named, size, fast)
@@ -99,16 +97,36 @@ class _Area:
     """
 
     def __init__(self, grid: OccupancyGrid, allowed: Flags) -> None:
-        self.spans = [(ceil(low * _UNIT), floor(high * _UNIT)) for low, high in bounds_of(grid, allowed)]
+        self.spans: list[tuple[int, int]] = [
+            (ceil(low * _UNIT), floor(high * _UNIT)) for low, high in bounds_of(grid, allowed)
+        ]
         self.forbidden = forbidden_area(grid, allowed)
 
-    def random_place(self, chance: Random) -> tuple[int, int]:
-        """Return a random place in the area, in hundredths of a metre. Raises `ValueError` if none is found."""
+    @property
+    def length(self) -> int:
+        """The longer side, in hundredths of a metre."""
+        return max(high - low for low, high in self.spans)
+
+    def domains(self, drone: int, step: float) -> tuple[Domain, Domain]:
+        """Return the domains of a drone's x and y, with grids whose step is at most `step` hundredths of a metre."""
+        x, y = (
+            real_domain(f"{axis}{drone}", low, high, ceil((high - low) / step) + 1)
+            for axis, (low, high) in zip("XY", self.spans, strict=True)
+        )
+        return x, y
+
+    def random_place(self, chance: Random, others: Sequence[tuple[int, int]]) -> tuple[int, int]:
+        """Return a random place, at least `_APART_M` from `others`, in hundredths of a metre.
+
+        Raises:
+            ValueError: No place is found.
+        """
         for _ in range(_TRIES):
             x, y = (random_integer(chance, low, high) for low, high in self.spans)
-            if not any(_is_inside((x, y), rectangle) for rectangle in self.forbidden):
+            is_near = any((x - a) ** 2 + (y - b) ** 2 < (_APART_M * _UNIT) ** 2 for a, b in others)
+            if not is_near and not any(_is_inside((x, y), rectangle) for rectangle in self.forbidden):
                 return x, y
-        raise ValueError("the map has too many small obstacles for real positions; use a coarser map")
+        raise ValueError(f"the map has no place for {len(others) + 1} homes {_APART_M} m apart; use fewer robots")
 
 
 def _is_inside(place: Sequence[int], rectangle: Rectangle) -> bool:

@@ -30,6 +30,7 @@ EXAMPLES: dict[str, dict[str, int | float | str]] = {
     "smart-homes": {"agents": 3, "rules": 2},
     "stochastic": {"agents": 3, "domain": 2},
     "swarm": {"agents": 2},
+    "swarm-on-map": {"map": BUILDING, "agents": 2},
     "tasks": {"agents": 2, "tasks": 2},
     "tracking": {"agents": 2, "targets": 1, "side": 3},
 }
