@@ -109,11 +109,15 @@ def no_protocol_left_registered() -> Iterator[None]:
 
 @pytest.fixture
 def quick_encryption(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Protocols that encrypt do so in a group in which no secret is safe, and whose elements are small."""
+    """Protocols encrypt in a group of small elements, in which no secret is safe, or share in the smallest field."""
+    from robochoc.protocols.private.p_dsa import PDSA, PDSASettings
+    from robochoc.protocols.private.pc_syncbb import PCSyncBB, PCSyncBBSettings
     from robochoc.protocols.private.rerooting import RerootingProtocol
     from tests.support.toy_group import ToyGroup
 
     monkeypatch.setattr(RerootingProtocol, "group", ToyGroup)
+    monkeypatch.setattr(PCSyncBB, "settings", PCSyncBBSettings(bits=31))
+    monkeypatch.setattr(PDSA, "settings", PDSASettings(cycles=4, bits=31))
 
 
 @pytest.fixture

@@ -18,6 +18,7 @@ from robochoc.solver.errors import UnsupportedError
 from tests.support.cases import looped
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
+from tests.support.encrypted_problems import short_settings
 from tests.support.examples import are_the_same, count, drawn
 from tests.support.problems import random_team
 from tests.support.random_options import random_options
@@ -61,7 +62,7 @@ def test_a_limited_run_says_nothing_else_than_a_free_one(runs: int, kind: str) -
 
 
 def _options(team: Team, protocol: str, chance: Random) -> Options:
-    own = {"cycles": "20"} if hasattr(protocol_named(protocol).settings, "cycles") else {}
+    own = short_settings(protocol, 20)
     options = random_options(team, protocol, chance)
     return replace(options, settings=own, withdraw=chance.choice((None, None, *Withdrawal)))
 

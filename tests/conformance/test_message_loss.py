@@ -22,6 +22,7 @@ from robochoc.solver.errors import UnsupportedError
 from tests.support.brute_force import least_cost
 from tests.support.cases import cases, looped
 from tests.support.cost_problems import random_cost_team
+from tests.support.encrypted_problems import short_settings
 from tests.support.examples import are_the_same, count, drawn
 from tests.support.loose_problems import minimum_cost
 from tests.support.problems import random_team
@@ -162,12 +163,11 @@ def problem(number: int) -> tuple[Team, Options]:
     name = OURS[number % len(OURS)]
     traits = protocol_named(name).traits
     team = (random_cost_team if traits.costs else random_team)(chance, n_ary=traits.n_ary)
-    cycles = {"cycles": "10"} if hasattr(protocol_named(name).settings, "cycles") else {}
     return team, Options(
         protocol=name,
         runtime=Runtime.PROCESSES,
         seed=number,
-        settings=cycles,
+        settings=short_settings(name, 10),
         message_loss=chance.choice((0.02, 0.1, 0.4)),
         order=chance.choice((None, None, Order.RANDOM, Order.DOM_DEG, Order.LEXICOGRAPHIC)),
         withdraw=chance.choice((None, None, None, *Withdrawal)),

@@ -28,7 +28,7 @@ from tests.simulation.drawing import is_refused
 from tests.simulation.invariants import violated
 from tests.simulation.plan import Plan
 from tests.support.brute_force import priced_solutions
-from tests.support.encrypted_problems import affordable
+from tests.support.encrypted_problems import affordable, short_settings
 from tests.support.examples import are_the_same, drawn
 from tests.support.loose_problems import loose_team
 from tests.support.random_options import random_options
@@ -64,7 +64,7 @@ def _team(protocol: str, chance: Random) -> Team:
 def _options(team: Team, protocol: str, start: dict[str, int | None], runtime: Runtime, chance: Random) -> Options:
     """Return options at random that can be combined."""
     kind = protocol_named(protocol)
-    settings = {"cycles": chance.choice("18")} if hasattr(kind.settings, "cycles") else {}
+    settings = short_settings(protocol, chance.choice((1, 8))) if hasattr(kind.settings, "cycles") else {}
     messages = None if settings or kind.traits.complete else 2000
     options = replace(random_options(team, protocol, chance), settings=settings, messages=messages, cache=False)
     if runtime != Runtime.SIMULATOR:

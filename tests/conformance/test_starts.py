@@ -20,6 +20,7 @@ from tests.support.asymmetric_problems import random_asymmetric_team, random_pkc
 from tests.support.brute_force import priced_solutions, solutions
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import minimum_withdrawal, random_complex_cost_team, random_cost_team
+from tests.support.encrypted_problems import short_settings
 from tests.support.examples import are_the_same, count, drawn
 from tests.support.problems import random_team
 from tests.support.random_options import random_options, random_schedule
@@ -153,7 +154,7 @@ def test_incomplete_protocols_return_nothing_worse_than_their_start(teams: int) 
             continue
         start, cost = chance.choice(found)
         for protocol in chance.sample(local, 3):
-            settings = {"cycles": "5"} if hasattr(protocol_named(protocol).settings, "cycles") else {}
+            settings = short_settings(protocol, 5)
             outcome = solve(team, replace(random_schedule(chance), protocol=protocol, start=start, settings=settings))
             assert outcome.cost is not None
             assert outcome.cost <= cost, (number, protocol)
@@ -212,7 +213,7 @@ def test_journals_contain_the_start() -> None:
         team = random_cost_team(chance)
         start = _start(team, list(priced_solutions(team)), chance)[1]
         protocol = chance.choice(protocols)
-        settings = {"cycles": "8"} if hasattr(protocol_named(protocol).settings, "cycles") else {}
+        settings = short_settings(protocol, 8)
         options = replace(random_options(team, protocol, chance), start=start, settings=settings)
         assert identical(replay(recorded(team, options))), (number, options)
 

@@ -30,7 +30,7 @@ from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.verification.checker import violations
 from tests.support.complex_problems import complex_team
-from tests.support.encrypted_problems import affordable
+from tests.support.encrypted_problems import affordable, short_settings
 from tests.support.limits import HANG_S
 from tests.support.loose_problems import minimum_cost, untold_interface
 from tests.support.paused_abt import PausedABT
@@ -106,7 +106,7 @@ def test_whatever_the_protocol_the_verdict_is_true_for_those_who_are_left(protoc
         kill=(Kill(team.order[2], 0),),
         on_loss=OnLoss.WITHDRAW,
         timeout=HANG_S,
-        settings={"cycles": "20"} if hasattr(kind.settings, "cycles") else {},
+        settings=short_settings(protocol, 20),
     )
     outcome = solve(team, options)
     assert outcome.epochs[0].lost == (team.order[2],)

@@ -16,7 +16,7 @@ from tests.support.allocation_problems import simple_allocation_team
 from tests.support.brute_force import least_cost, solutions
 from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team
-from tests.support.encrypted_problems import affordable
+from tests.support.encrypted_problems import affordable, short_settings
 from tests.support.in_memory_network import InMemoryNetwork
 from tests.support.lone_robot import chain_of_three
 from tests.support.pkc_problems import random_pkc_team
@@ -54,7 +54,7 @@ def test_nobody_is_doubted_who_is_honest(name: str) -> None:
     team = affordable(name, lambda: draw(chance, n_ary=False))
     if protocol.traits.allocates:
         team = simple_allocation_team(chance)
-    parameters = RunParameters(settings={"cycles": "5"} if hasattr(protocol.settings, "cycles") else {})
+    parameters = RunParameters(settings=short_settings(name, 5))
     office = InMemoryNetwork(known_to_both(team), protocol, parameters=parameters)
     result = office.search()
     assert not office.failures

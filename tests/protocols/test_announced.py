@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from operator import attrgetter
 from random import Random
 
@@ -22,6 +23,7 @@ from tests.support.allocation_problems import ANY_TEAM
 from tests.support.announcements import best_of, check_announcements, observed
 from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team, random_hard_team, with_costs
+from tests.support.encrypted_problems import affordable, short_settings
 
 MINIMISING = tuple(name for name in ANY_TEAM if protocol_named(name).traits.costs)
 INCOMPLETE = tuple(name for name in MINIMISING if not protocol_named(name).traits.complete)
@@ -36,18 +38,18 @@ def some_team(chance: Random, number: int) -> Team:
     return random_cost_team(chance, n_ary=False)
 
 
-def settings_of(protocol: str) -> dict[str, str]:
-    return {"cycles": str(CYCLES)} if hasattr(protocol_named(protocol).settings, "cycles") else {}
-
-
 @looped("protocol", INCOMPLETE)
 def test_the_answer_is_the_best_that_was_announced(protocol: str) -> None:
     chance, any_announced = Random(f"announced {protocol}"), 0
-    for number in range(9):
-        team = some_team(chance, number)
+    for number in range(6):
+        team = affordable(protocol, partial(some_team, chance, number))
         schedule = (ScheduleName.CONCURRENT, ScheduleName.CYCLES, ScheduleName.RANDOM)[number % 3]
         options = Options(
-            protocol=protocol, runtime=Runtime.SIMULATOR, seed=number, schedule=schedule, settings=settings_of(protocol)
+            protocol=protocol,
+            runtime=Runtime.SIMULATOR,
+            seed=number,
+            schedule=schedule,
+            settings=short_settings(protocol, CYCLES),
         )
         any_announced += check_announcements(team, options)
     assert any_announced
@@ -57,10 +59,10 @@ def test_the_answer_is_the_best_that_was_announced(protocol: str) -> None:
 def test_the_answer_of_a_search_that_was_cut_is_the_best_that_was_announced(protocol: str) -> None:
     chance, any_announced = Random(f"cut {protocol}"), 0
     for number in range(6):
-        team = some_team(chance, number)
+        team = affordable(protocol, partial(some_team, chance, number))
         options = Options(
             protocol=protocol, runtime=Runtime.SIMULATOR, seed=number, messages=chance.choice((20, 60)),
-            settings=settings_of(protocol), cache=False,
+            settings=short_settings(protocol, CYCLES), cache=False,
         )  # fmt: skip
         any_announced += check_announcements(team, options)
     assert any_announced or protocol in {"duct", "maxsum", "bounded-maxsum", "p-dsa"}
@@ -71,7 +73,7 @@ def test_the_answer_of_a_search_that_was_cut_is_the_best_that_was_announced(prot
 def test_that_it_is_so_in_other_runtimes(protocol: str, runtime: Runtime) -> None:
     team = random_cost_team(Random(4), n_ary=False)
     assert check_announcements(
-        team, Options(protocol=protocol, runtime=runtime, seed=2, settings=settings_of(protocol))
+        team, Options(protocol=protocol, runtime=runtime, seed=2, settings=short_settings(protocol, CYCLES))
     )
 
 

@@ -21,7 +21,7 @@ from tests.support.allocation_problems import ANY_TEAM
 from tests.support.brute_force import least_cost
 from tests.support.cases import looped
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
-from tests.support.encrypted_problems import affordable
+from tests.support.encrypted_problems import affordable, short_settings
 
 pytestmark = pytest.mark.usefixtures("quick_encryption")
 MINIMISING = tuple(name for name in ANY_TEAM if protocol_named(name).traits.costs)
@@ -85,10 +85,10 @@ def test_that_the_optimum_is_between_the_bound_and_the_best_so_far(protocol: str
 @looped("protocol", UNPROVEN)
 def test_that_nothing_is_told_by_protocols_that_prove_nothing(protocol: str) -> None:
     chance = Random(protocol)
-    settings = {"cycles": "10"} if hasattr(protocol_named(protocol).settings, "cycles") else {}
+    settings = short_settings(protocol, 10)
     options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, bounds=True, settings=settings)
     for seed in range(3):
-        team = random_cost_team(chance, n_ary=False)
+        team = affordable(protocol, partial(random_cost_team, chance, n_ary=False))
         events, _ = _events(team, replace(options, seed=seed))
         assert not any(isinstance(event, Bounded) for event in events)
 

@@ -1,4 +1,4 @@
-"""Problems that are small enough for protocols whose tables have a cipher for each cell and each cost."""
+"""Small problems and short runs for protocols that encrypt or share each cost."""
 
 from __future__ import annotations
 
@@ -21,6 +21,13 @@ def affordable(protocol: str, draw: Callable[[], Team], most: int = MOST_CIPHERS
         team = cheap(draw())
         if ciphers_at_most(team) <= most:
             return team
+
+
+def short_settings(protocol: str, cycles: int) -> dict[str, str]:
+    """Return settings for a short run: this number of `cycles`, or two on secret shares, in the smallest field."""
+    known = protocol_named(protocol).settings
+    settings = {"cycles": str(2 if hasattr(known, "bits") else cycles), "bits": "31"}
+    return {name: value for name, value in settings.items() if hasattr(known, name)}
 
 
 def cheap(team: Team) -> Team:

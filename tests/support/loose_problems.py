@@ -33,7 +33,7 @@ from tests.support.allocation_problems import simple_allocation_team
 from tests.support.brute_force import least_cost, solutions
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team, softened
-from tests.support.encrypted_problems import affordable
+from tests.support.encrypted_problems import affordable, short_settings
 from tests.support.pkc_problems import random_pkc_team
 from tests.support.problems import random_team
 
@@ -117,7 +117,7 @@ def check_against_brute_force(team: Team, options: Options, solver: AceProcess |
     """
     protocol = protocol_named(options.protocol)
     if hasattr(protocol.settings, "cycles"):
-        options = replace(options, settings={"cycles": "4" if protocol.traits.encrypted_tables else "20"})
+        options = replace(options, settings=short_settings(options.protocol, 20))
     if not protocol.traits.complete and not protocol.traits.encrypted_tables:
         options = replace(options, messages=ENOUGH)
     outcome = solve(team, options, solver=solver)

@@ -23,7 +23,7 @@ from tests.support.asymmetric_problems import random_asymmetric_team
 from tests.support.complex_changes import random_complex_changing_team
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
-from tests.support.encrypted_problems import affordable
+from tests.support.encrypted_problems import affordable, short_settings
 from tests.support.pkc_problems import random_pkc_team
 from tests.support.problems import random_team
 from tests.support.random_changes import random_changing_team
@@ -55,9 +55,7 @@ def random_run(protocol: str, chance: Random, number: int) -> tuple[Team, Option
     """A team of the families in turn, and options at random, as far as the protocol and the team leave a choice."""
     makers = families(protocol)
     team = affordable(protocol, lambda: makers[number % len(makers)](chance))
-    options = replace(random_schedule(chance), protocol=protocol, messages=ENOUGH)
-    if hasattr(protocol_named(protocol).settings, "cycles"):
-        options = replace(options, settings={"cycles": "8"})
+    options = replace(random_schedule(chance), protocol=protocol, messages=ENOUGH, settings=short_settings(protocol, 8))
     if team.dynamic:
         return team, options
     parts = any(one.model is ConstraintModel.PKC for one in team.constraints())

@@ -27,12 +27,12 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.choice import choose_for_private_team
-from robochoc.run.registry import protocol_named
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import ensure_compiled
 from tests.support.brute_force import least_cost
 from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team
+from tests.support.encrypted_problems import short_settings
 from tests.support.examples import count
 
 
@@ -200,7 +200,7 @@ def test_in_processes_no_verdict_is_wrong_where_a_tenth_is_lost(runs: int) -> No
     names = ("dsa", "gdba", "maxsum", "async-maxsum", "sfb", "dpop", "adopt", "mgm2", "a-dsa", "lamdls", "maxsum-ad")
     for number in range(runs):
         name = names[number % len(names)]
-        cycles = {"cycles": "5"} if hasattr(protocol_named(name).settings, "cycles") else {}
+        cycles = short_settings(name, 5)
         team = random_cost_team(Random(number), n_ary=False)
         outcome = solve(team, replace(lossy(name, Runtime.PROCESSES, 0.1, **cycles), seed=number))
         sure = not outcome.metrics.lost_messages

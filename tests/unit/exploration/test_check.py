@@ -34,6 +34,7 @@ from robochoc.solver.errors import UnsupportedError
 from robochoc.solver.local_problem import LocalProblem
 from robochoc.testing import check_protocol
 from tests.support.compiled import plain_python_only
+from tests.support.encrypted_problems import short_settings
 from tests.support.examples import count
 from tests.support.faulty_abt import AnyNogood, NoAnswer
 from tests.support.program import ROOT
@@ -75,8 +76,7 @@ def test_the_reduced_orders_lead_to_the_same_ends_with_packets(name: str) -> Non
 def _compare_reduced(name: str, teams: int, *, packets: bool, most: int = 1500) -> int:
     """Compare the ends of all orders with those of the reduced ones. Return the number of compared teams."""
     protocol, compared = protocol_named(name), 0
-    settings = {"cycles": "2"} if hasattr(protocol.settings, "cycles") else {}
-    run = Options(protocol=name, runtime=Runtime.SIMULATOR, settings=settings)
+    run = Options(protocol=name, runtime=Runtime.SIMULATOR, settings=short_settings(name, 2))
     for team in itertools.islice(small_teams(protocol.traits, 3, 2, 0), teams):
         case = check.case_of(team, protocol, run)
         stage = Stage.first_of(Course(case.compiled.team, case.phase))
