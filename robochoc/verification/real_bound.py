@@ -21,6 +21,7 @@ from robochoc.model.expression.bounds import Interval, bounds
 from robochoc.model.expression.slopes import Number, local_model
 from robochoc.model.magnitudes import extent
 from robochoc.model.problem import Assignment, Team
+from robochoc.verification.price_tables import ROWS, PriceTable, count_in, price_table
 
 EVALUATIONS = 40_000
 """The default maximum number of evaluations of a cost over a box."""
@@ -60,15 +61,30 @@ class _Problem(NamedTuple):
         box: The intervals of its variables.
         costs: The costs over these variables.
         hard: The hard predicates.
-        least: A lower bound of the costs in relations, which have no expression.
-        restricted: The variables in hard constraints.
+        tables: The relations, which have no expression.
+        domains: The values of the variables, by name; of real variables, all multiples of the precision.
+        restricted: The variables in hard constraints and relations.
     """
 
     box: _Box
     costs: Sequence[_Cost]
     hard: Sequence[Expression]
-    least: int
+    tables: Sequence[PriceTable]
+    domains: dict[str, Sequence[range]]
     restricted: Collection[str]
+
+    @property
+    def work(self) -> int:
+        """The work for a box, in evaluations of a cost."""
+        return len(self.costs) + len(self.hard) + sum(len(table.prices) // ROWS + 1 for table in self.tables)
+
+    def least_price(self, box: _Box) -> int | None:
+        """Return a lower bound of the costs in relations over `box`. None: `box` contains no allowed values."""
+        counts = {name: count_in(self.domains[name], part) for name, part in box.items()}
+        prices = [table.least(box, counts) for table in self.tables]
+        if not all(counts.values()) or None in prices:
+            return None
+        return sum(price for price in prices if price is not None)
 
 
 class _Open(NamedTuple):
@@ -92,10 +108,10 @@ def certificate(team: Team, best: Assignment, evaluations: int = EVALUATIONS) ->
     sign = -1 if units.maximize else 1
     finest = math.lcm(*(_divisor(one) for one in team.constraints()))
     problems = _parts(team, units.places, sign * finest)
-    work = sum(len(problem.costs) + len(problem.hard) for problem in problems) or 1
+    work = sum(problem.work for problem in problems) or 1
     total = 0
     for problem in problems:
-        bound = _bound(problem, best, evaluations * (len(problem.costs) + len(problem.hard)) // work)
+        bound = _bound(problem, best, evaluations * problem.work // work)
         if bound is None:
             return Certificate(None, is_infeasible=True)
         total += bound
@@ -114,13 +130,13 @@ def _bound(problem: _Problem, best: Assignment, evaluations: int) -> int | None:
     waiting, closed = [first], [] if known is None else [known]
     while waiting and evaluations > 0 and (known is None or waiting[0].bound < known):
         one = heapq.heappop(waiting)
-        halves = _halves(one)
-        if not halves:
+        halves = _halves(one, () if best else problem.restricted)
+        if not halves and not _is_undefined(problem, one.box):
             closed.append(one.bound)
             if known is None:
                 break  # an assignment, of which no bound is lower
         for half in halves:
-            evaluations -= len(problem.costs) + len(problem.hard) + 1
+            evaluations -= problem.work + 1
             opened = _opened(problem, half, best, next(count))
             if opened is not None and (known is None or opened.bound < known):
                 heapq.heappush(waiting, opened._replace(bound=max(opened.bound, one.bound)))
@@ -132,10 +148,11 @@ def _opened(problem: _Problem, box: _Box, best: Assignment, number: int) -> _Ope
 
     Where the costs only rise or fall with a variable without hard constraints, only its better end remains.
     """
-    if any(bounds(body, box).high == 0 for body in problem.hard):
+    least = problem.least_price(box)
+    if least is None or any(bounds(body, box).high == 0 for body in problem.hard):
         return None
     point = {name: _nearest(best.get(name), part) for name, part in box.items()}
-    intervals: float = problem.least
+    intervals: float = least
     tangents, means = intervals, intervals
     slopes: dict[str, Interval] = {}
     gradient: dict[str, Interval] = {}
@@ -169,10 +186,12 @@ def _convex_bound(problem: _Problem, best: Assignment, tangents: int) -> int:
     tangents are exact, so that each of them is a bound wherever the way leads.
     """
     point: dict[str, Number] = {name: _nearest(best.get(name), part) for name, part in problem.box.items()}
-    bounds_found = [_lowest(problem)]
+    least = problem.least_price(problem.box) or 0
+    lows = [_product(bounds(cost.body, problem.box), cost.weight).low - cost.slack for cost in problem.costs]
+    bounds_found = [int(sum(lows)) + least]
     before: tuple[dict[str, Number], dict[str, Number]] | None = None
     for _ in range(tangents):
-        bound, gradient = Fraction(problem.least), dict[str, Number]()
+        bound, gradient = Fraction(least), dict[str, Number]()
         for cost in problem.costs:
             model = local_model(cost.body, problem.box, point)
             if model is None or not (model.convex if cost.weight > 0 else model.concave):
@@ -186,11 +205,6 @@ def _convex_bound(problem: _Problem, best: Assignment, tangents: int) -> int:
         bounds_found.append(math.floor(bound))
         point, before = _next_point(problem.box, point, gradient, before), (point, gradient)
     return max(bounds_found)
-
-
-def _lowest(problem: _Problem) -> int:
-    lows = [_product(bounds(cost.body, problem.box), cost.weight).low - cost.slack for cost in problem.costs]
-    return int(sum(lows)) + problem.least
 
 
 def _next_point(
@@ -246,15 +260,18 @@ def _better_end(part: Interval, slope: Interval | None) -> Interval:
     return Interval(part.high, part.high) if slope.high <= 0 else part
 
 
-def _halves(one: _Open) -> list[_Box]:
-    """Return both halves of a box, divided where the costs vary most. A single assignment has no halves."""
+def _halves(one: _Open, first: Collection[str]) -> list[_Box]:
+    """Return both halves of a box, divided where the costs vary most. A single assignment has no halves.
+
+    The variables `first` are divided before the others.
+    """
     wide = [name for name, part in one.box.items() if part.low < part.high]
     if not wide:
         return []
 
-    def variation(name: str) -> tuple[float, float]:
+    def variation(name: str) -> tuple[bool, float, float]:
         width, slope = one.box[name].high - one.box[name].low, one.slopes.get(name, _ZERO)
-        return width * max(-slope.low, slope.high), width
+        return name in first, width * max(-slope.low, slope.high), width
 
     name = max(wide, key=variation)
     low, high = one.box[name]
@@ -262,10 +279,26 @@ def _halves(one: _Open) -> list[_Box]:
     return [{**one.box, name: Interval(low, middle)}, {**one.box, name: Interval(middle + 1, high)}]
 
 
+def _is_undefined(problem: _Problem, box: _Box) -> bool:
+    """Return whether a condition or a cost is undefined, or false, for the single assignment in `box`.
+
+    Costs with slopes are defined, and their variables may be at ends of larger boxes.
+    """
+    point = {name: int(part.low) for name, part in box.items()}
+    steps = [cost.body for cost in problem.costs if local_model(cost.body, box, point) is None]
+    try:
+        for body in steps:
+            evaluate(body, point)
+        return not all(evaluate(body, point) for body in problem.hard)
+    except UndefinedValueError:
+        return True
+
+
 def _cost_at(problem: _Problem, best: Assignment) -> int | None:
     """Return the cost of an assignment; None if it is undefined."""
+    least = problem.least_price({name: Interval(best[name], best[name]) for name in problem.box})
     try:
-        return problem.least + sum(cost.weight * evaluate(cost.body, best) for cost in problem.costs)
+        return None if least is None else least + sum(cost.weight * evaluate(cost.body, best) for cost in problem.costs)
     except UndefinedValueError:
         return None
 
@@ -285,8 +318,10 @@ def _parts(team: Team, places: int, weight: int) -> list[_Problem]:
             leader[found(other)] = found(first)
     groups: dict[str, _Problem] = {}
     for name, variable in team.variables.items():
-        group = groups.setdefault(found(name), _Problem({}, [], [], 0, set()))
+        group = groups.setdefault(found(name), _Problem({}, [], [], [], {}, set()))
         group.box[name] = extent(variable.domain)
+        ranges = variable.domain.ranges
+        group.domains[name] = [range(one.low, one.high + 1)] if (one := variable.domain.real) else ranges
     for robot in team.robots:
         unit = weight * 10 ** (places - robot.costs.places)
         for constraint in robot.constraints():
@@ -299,9 +334,9 @@ def _with_constraint(problem: _Problem, constraint: Constraint, unit: int, place
     """Return `problem` with a constraint, whose costs are multiplied by `unit`, or by `weight` if it is a function."""
     match constraint.definition:
         case Relation() as relation:
-            prices = [int(cost) * unit for cost in relation.finite_costs]
+            table = price_table(constraint, relation, unit, problem.domains)
             restricted = {*problem.restricted, *constraint.variables}
-            return problem._replace(least=problem.least + min(prices), restricted=restricted)
+            return problem._replace(tables=[*problem.tables, table], restricted=restricted)
         case Function() as function:
             factor = weight * 10 ** (places - function.places)
             match constraint.applied:

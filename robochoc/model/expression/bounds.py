@@ -107,8 +107,12 @@ def _product(*parts: Interval) -> Interval:
 
 
 def _quotient(dividend: Interval, divisor: Interval) -> Interval:
-    """Return the bounds of a truncated quotient. Its divisor is at least 1 or at most -1."""
+    """Return the bounds of a truncated quotient. Its divisor is at least 1 or at most -1, since 0 has no quotient."""
     size = _absolute(dividend).high
+    if divisor.low == 0 < divisor.high:
+        divisor = Interval(1, divisor.high)
+    elif divisor.high == 0 > divisor.low:
+        divisor = Interval(divisor.low, -1)
     if divisor.low <= 0 <= divisor.high or any(end in _INFINITE for end in (*dividend, *divisor)):
         return Interval(-size, size)
     ends = [_truncated(int(part), int(by)) for part in dividend for by in divisor]
