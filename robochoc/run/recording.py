@@ -15,9 +15,12 @@ if TYPE_CHECKING:
 
 
 def objective_to_record(team: Team, options: Options) -> Callable[[], Objective] | None:
-    """Return a function that builds the objective of a run, or None if nothing is minimised or the problem changes."""
+    """Return a function that builds the objective of a run, or None if nothing is minimised or the problem changes.
+
+    It is also None if the team has several objectives, which the run combines into one.
+    """
     minimum = options.withdraw == Withdrawal.MINIMUM
-    if team.dynamic or not (minimum or team.kind == ProblemKind.DISWCSP):
+    if team.dynamic or team.objectives or not (minimum or team.kind == ProblemKind.DISWCSP):
         return None
     counted = normalized(team)
     in_step = options.schedule == ScheduleName.CYCLES or options.runtime == Runtime.ARRAYS

@@ -37,11 +37,9 @@ _MARKED = "{fill:#d9730d;stroke:currentColor;stroke-width:2px}"
 
 def front_page(outcome: Outcome, team: Team) -> str:
     """Return the page of an outcome with a Pareto front, of a `team` with the same variables."""
-    step = -(-len(outcome.front) // MOST_SHOWN)
-    shown = [(number, point) for number, point in enumerate(outcome.front, 1) if (number - 1) % step == 0]
+    shown = _shown(outcome.front)
     title = html.escape(f"Pareto front: {outcome.team}")
-    names = (*outcome.front[0].objectives,)
-    charts = "".join(_chart(shown, names, pair) for pair in itertools.combinations(names, 2))
+    charts = _charts(shown)
     points = "".join(_point(number, point, outcome, team, len(shown)) for number, point in shown)
     anchors = "".join(f'<i id="p{number}"></i>' for number, _ in shown)
     head = (
@@ -54,6 +52,43 @@ def front_page(outcome: Outcome, team: Team) -> str:
         f"<p>{_summary(outcome, len(shown))}</p></header>\n<main><div>{charts}</div>\n<div>{points}</div></main>"
         "</body></html>\n"
     )
+
+
+def front_choice(front: Sequence[FrontPoint], chosen: int) -> str:
+    """Return the charts and the table of a front in HTML. Each point is a link: `#p3`.
+
+    Args:
+        front: The points.
+        chosen: The number of the marked point, from 1 on.
+    """
+    shown = sorted({*dict(_shown(front)), chosen})
+    points = [(number, front[number - 1]) for number in shown]
+    heads = "".join(f'<th scope="col">{html.escape(name)}</th>' for name in front[0].objectives)
+    rows = "".join(_row(number, point, is_chosen=number == chosen) for number, point in points)
+    return (
+        f"<style>.front .c{chosen} circle{_MARKED}</style>{_charts(points)}"
+        f'<div class="points"><table><thead><tr><th scope="col">point</th>{heads}</tr></thead>'
+        f"<tbody>{rows}</tbody></table></div>"
+    )
+
+
+def _row(number: int, point: FrontPoint, *, is_chosen: bool) -> str:
+    costs = "".join(f"<td>{_text(cost)}</td>" for cost in point.objectives.values())
+    current = ' aria-current="true"' if is_chosen else ""
+    link = f'<a href="#p{number}"{current}>{number:,}</a>'
+    return f'<tr{" class=chosen" * is_chosen}><th scope="row">{link}</th>{costs}</tr>'
+
+
+def _shown(front: Sequence[FrontPoint]) -> list[tuple[int, FrontPoint]]:
+    """Return the points that are shown, with their numbers from 1 on."""
+    step = -(-len(front) // MOST_SHOWN)
+    return [*enumerate(front, 1)][::step]
+
+
+def _charts(shown: Sequence[tuple[int, FrontPoint]]) -> str:
+    """Return a chart for each pair of objectives."""
+    names = (*shown[0][1].objectives,)
+    return "".join(_chart(shown, names, pair) for pair in itertools.combinations(names, 2))
 
 
 def _summary(outcome: Outcome, shown: int) -> str:

@@ -21,7 +21,7 @@ from robochoc.formats import InvalidInputError, read_team
 from robochoc.model.change import team_after_events
 from robochoc.model.problem import INFINITE, Team
 from robochoc.modelling.errors import ModelError
-from robochoc.verification.checker import RefutedError, check_user_cost, constraint_cost
+from robochoc.verification.checker import RefutedError, check_user_cost, constraint_cost, objective_costs
 
 CHECK_S = 5.0
 """The time limit in seconds for checking all constraints, after which the answer counts as unchecked."""
@@ -60,7 +60,7 @@ def check(run: Run) -> None:
         team, code = _team_of_sketch(run, result) if drawn else _team_of_files(run, result)
         record.maximised = not drawn and any(robot.costs.maximize for robot in team.robots)
         if result is not None and result.assignment:
-            record.checked = _checked(team, code, result)
+            record.checked = _checked_points(team, code, result)
 
 
 _Code = Callable[[str, Value], int | None]
@@ -99,6 +99,16 @@ def _team_of_files(run: Run, result: RunResult | None) -> tuple[Team, _Code]:
     return team, code
 
 
+def _checked_points(team: Team, code: _Code, result: RunResult) -> Checked | None:
+    """Check an answer, or each point of a Pareto front, or return None if the time limit was reached."""
+    until = time.monotonic() + CHECK_S
+    for place in range(max(1, len(result.front))):
+        found = _checked(team, code, result.at_point(place)) if time.monotonic() <= until else None
+        if found != Checked.KEPT:
+            return found
+    return Checked.KEPT
+
+
 def _checked(team: Team, code: _Code, result: RunResult) -> Checked | None:
     """Check an answer for a team, or return None if the time limit was reached."""
     aside = frozenset(result.withdrawn)
@@ -119,6 +129,8 @@ def _checked(team: Team, code: _Code, result: RunResult) -> Checked | None:
 
 
 def _is_cost_correct(team: Team, values: Mapping[str, int], result: RunResult, aside: frozenset[str]) -> bool:
+    if team.objectives:
+        return objective_costs(team, values, aside) == dict(result.objectives)
     try:
         check_user_cost(team, values, result.cost, without=aside)
     except RefutedError:

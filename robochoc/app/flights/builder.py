@@ -156,6 +156,13 @@ class FlightBuilder:
         if self.troubles or self._needs_flight:
             self._start()
 
+    def discard(self) -> None:
+        """Delete the flight and its recording, because another point of the run's Pareto front was chosen."""
+        self.cancel()
+        for name in (FLIGHT, FLOWN, RECORDING):
+            (self.run.folder / name).unlink(missing_ok=True)
+        self._set_stage(BuildStage.WAITING)
+
     def cancel(self) -> None:
         """End the work. Existing files are kept."""
         if self._job is not None:
@@ -236,8 +243,8 @@ class FlightBuilder:
         return ["--map", MAP]
 
     def _result(self) -> str:
-        """Return the file with the run's result, including its events in words if there are any."""
-        result = captioned(self.run)
+        """Return the file with the run's result, with its events in words, or of the chosen point of a front."""
+        result = captioned(self.run) or of_chosen_point(self.run)
         if result is None:
             return RESULT
         write_atomically(self.run.folder / CAPTIONED, result)
@@ -246,7 +253,7 @@ class FlightBuilder:
     def _record(self, job: Job[Path]) -> Path:
         self._write_team()
         fresh = f"{RECORDING}.new"
-        given = [RESULT, "--team", self.run.team.name, *self._map()]
+        given = [self._result(), "--team", self.run.team.name, *self._map()]
         self._run(job, "fly", *given, "--json", "--ros", f"mcap:{fresh}")
         return (self.run.folder / fresh).replace(self.run.folder / RECORDING)
 
@@ -299,6 +306,16 @@ def captioned(run: Run) -> bytes | None:
         result["epochs"] = [first, *({**epoch, "opened_by": caption} for epoch, caption in captions)]
         return msgspec.json.encode(result) + b"\n"
     return None
+
+
+def of_chosen_point(run: Run) -> bytes | None:
+    """Return the result of a run with the values of the chosen point of its front, or None if it is the first one."""
+    if run.result is None or not run.result.point:
+        return None
+    result: dict[str, Any] = msgspec.json.decode((run.folder / RESULT).read_bytes().partition(b"\n")[0])
+    point = result["front"][run.result.point]
+    result |= {**point, "cost": next(iter(point["objectives"].values()))}
+    return msgspec.json.encode(result) + b"\n"
 
 
 def _events(run: Run) -> list[str]:

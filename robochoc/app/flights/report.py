@@ -103,6 +103,8 @@ def summary(sketch: Sketch, run: Run) -> str:
     verdict = "fewest" if result.verdict == "optimal" and result.withdrawn else result.verdict
     worth = run.record.maximised
     verdict = "most" if worth and verdict == "optimal" else verdict
+    if result.front:
+        return claim_words(run, f"{say('report.verdict.solution', robots=robots)} {result.point_in_words}")
     words = [say(f"report.verdict.{verdict}", robots=robots)] if verdict in _VERDICTS else [verdict]
     if result.withdrawn and not flying_robots_words(run):  # those words would also mention withdrawn robots
         words.append(say("report.withdrawn", names=listed(result.withdrawn)))

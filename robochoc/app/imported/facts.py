@@ -79,6 +79,7 @@ class ImportedFacts(msgspec.Struct, frozen=True):
         linked: The number of all such pairs.
         costs: True if there are costs.
         maximised: True if costs are utilities, whose sum is maximised.
+        objectives: The names of several objectives; empty if there is a single cost.
         events: The events in words.
         flies: True if the team's files contain positions of robots.
         files: For a team that was drawn here, the files that were changed later; otherwise empty.
@@ -96,6 +97,7 @@ class ImportedFacts(msgspec.Struct, frozen=True):
     linked: int = 0
     costs: bool = False
     maximised: bool = False
+    objectives: tuple[str, ...] = ()
     events: tuple[str, ...] = ()
     flies: bool = False
     files: tuple[str, ...] = ()
@@ -124,6 +126,7 @@ def facts_of(team: Team, *, files: Sequence[str] = (), notes: Sequence[str] = ()
         linked=len(links),
         costs=team.kind == ProblemKind.DISWCSP,
         maximised=bool(team.robots) and team.robots[0].costs.maximize,
+        objectives=team.objectives,
         events=events_in_words(team),
         flies=bool(team.robots) and all(map(has_place, team.robots)),
         files=tuple(files),

@@ -11,9 +11,10 @@ from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.sketch.troubles import NotReadyError
 from robochoc.formats import read_team
 from robochoc.model.problem import Team
-from robochoc.run.choice import accepts, choose
+from robochoc.run.choice import accepts
 from robochoc.run.facts import Facts
 from robochoc.run.options import Options, Runtime
+from robochoc.run.orchestrator import prepare
 from robochoc.run.registry import installed_protocols
 
 
@@ -53,8 +54,10 @@ def team_of(sketch: Sketch, files: TeamFiles | None = None) -> Team:
 
 def fitting_protocols(team: Team, options: Options) -> tuple[tuple[str, bool], ...]:
     """Return the protocols that accept a team, complete ones first, each with whether it is complete."""
-    known = [(one.name, one.protocol.traits.complete) for one in installed_protocols() if one.protocol]
-    fit = [(name, complete) for name, complete in known if accepts(name, team, options)]
+    traits = {one.name: one.protocol.traits for one in installed_protocols() if one.protocol}
+    solved = prepare(team, options).team if team.objectives else team
+    known = [(name, one.complete) for name, one in traits.items() if one.fronts or not team.objectives]
+    fit = [(name, complete) for name, complete in known if accepts(name, solved, options)]
     return tuple(sorted(fit, key=lambda one: (not one[1], one[0])))
 
 
@@ -68,7 +71,7 @@ def fitting(sketch: Sketch, files: TeamFiles | None = None, runtime: str = Runti
     """
     team = team_of(sketch, files)
     options = Options(runtime=Runtime(runtime))
-    choice = choose(team, options)
+    choice = prepare(team, options).choice
     return Fitting(
         protocols=fitting_protocols(team, options),
         costs=Facts(team).has_costs,

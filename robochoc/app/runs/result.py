@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import field, replace
 from functools import cached_property
 from types import MappingProxyType
 
+from robochoc.app.sketch.sentences import listed
 from robochoc.app.sketch.sketch import Value
+from robochoc.app.texts import say
 from robochoc.formats.result import ResultError, read_result
+from robochoc.model.cost_units import cost_shown
 from robochoc.model.outcome import Answer, Outcome, Verdict
 from robochoc.system.lazy_dataclass import dataclass
 
@@ -19,9 +22,11 @@ class RunResult(Outcome):
 
     Attributes:
         labels: The user's words for values, by their names in files.
+        point: The index of the point of the Pareto front whose values and costs this result has.
     """
 
     labels: Mapping[str, str] = field(default_factory=dict, compare=False)
+    point: int = 0
 
     @property
     def messages(self) -> int:
@@ -50,6 +55,22 @@ class RunResult(Outcome):
         named = self.labelled(answer.assignment)
         shown = {name: str(value) if isinstance(value, float) else value for name, value in named.items()}
         return {name: self.labels.get(str(value), value) for name, value in shown.items()}
+
+    def at_point(self, place: int) -> RunResult:
+        """Return this result with the values and costs of the point at this index of its front, if there is one."""
+        if not 0 <= place < len(self.front):
+            return self
+        point = self.front[place]
+        cost = next(iter(point.objectives.values()), None)
+        return replace(self, assignment=point.assignment, objectives=point.objectives, cost=cost, point=place)
+
+    @property
+    def point_in_words(self) -> str:
+        """The chosen point of the Pareto front with its costs, as a sentence; empty if there is no front."""
+        if not self.front:
+            return ""
+        costs = listed([f"{name} {cost_shown(cost)}" for name, cost in self.objectives.items()])
+        return say("decide.point", number=self.point + 1, points=f"{len(self.front):,}", costs=costs)
 
     def value(self, robot: str, decision: str) -> Value | None:
         """Return the value that a robot chose for a decision."""

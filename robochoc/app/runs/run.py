@@ -68,6 +68,7 @@ class Record(msgspec.Struct):
     `labels`: the user's values that are spelled differently in files, by the spelling in files. `opened`: whether the
     run comes from an opened file; `checked`: the result of checking its answer (None: could not be checked). For an
     imported team, `flies`: whether its decisions are robots' positions; `maximised`: whether its costs are utilities.
+    `point`: the index of the chosen point of a Pareto front.
     """
 
     options: RunOptions
@@ -82,6 +83,7 @@ class Record(msgspec.Struct):
     checked: Checked | None = None
     flies: bool | None = None
     maximised: bool = False
+    point: int = 0
 
 
 class Watcher(Protocol):
@@ -198,6 +200,16 @@ class Run(PartsOwner):
         self.record.state = state
         self.save()
 
+    def choose_point(self, place: int) -> None:
+        """Choose the point at this index of the Pareto front, whose values are then those of the result."""
+        result = self.read_result()
+        if result is None or not 0 <= place < len(result.front):
+            return
+        self.record.point = place
+        self.result = result.at_point(place)
+        self.save()
+        self.notify()
+
     def save(self) -> None:
         """Save the record atomically."""
         fresh = self.folder / f"{RECORD}.{os.getpid()}.new"
@@ -211,7 +223,8 @@ class Run(PartsOwner):
         if self.result is None:
             with suppress(OSError):
                 if 0 < file.stat().st_size <= MAX_RESULT:
-                    self.result = decoded(file.read_bytes(), self.record.labels)
+                    result = decoded(file.read_bytes(), self.record.labels)
+                    self.result = result and result.at_point(self.record.point)
         return self.result
 
 

@@ -106,11 +106,7 @@ def _folder(folder: Path) -> Sketch | ImportedTeam:
     found = sketch_in(folder, xml)
     if isinstance(found, Sketch):
         return found
-    team = read_team(folder)
-    if team.objectives:
-        hint = "use 'robochoc solve --html FILE', whose page shows the Pareto front"
-        raise invalid_input(folder, "the team has several objectives, and the application requires a single cost", hint)
-    return ImportedTeam(folder, team, changed=found)
+    return ImportedTeam(folder, read_team(folder), changed=found)
 
 
 def _xml_in(folder: Path) -> dict[str, bytes]:

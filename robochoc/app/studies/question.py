@@ -13,9 +13,9 @@ from robochoc.app.texts import say
 from robochoc.experiments.study import toml_of
 from robochoc.formats.names import is_name
 from robochoc.model.problem import ProblemKind
-from robochoc.run.choice import choose
 from robochoc.run.facts import Facts
 from robochoc.run.options import Options, Runtime
+from robochoc.run.orchestrator import prepare
 
 MOST_RUNS = 100
 MOST_SECONDS = 600
@@ -70,7 +70,7 @@ def possible(sketch: Sketch, files: TeamFiles | None = None) -> PossibleQuestion
     team = team_of(sketch, files)
     options = Options(runtime=Runtime.SIMULATOR)
     fit = fitting_protocols(team, options)
-    chosen = choose(team, options).options.protocol
+    chosen = prepare(team, options).choice.options.protocol
     names = [name for name, _ in fit]
     beside = next((name for name in (*_COMMON, *names) if name in names and name != chosen), None)
     usual = tuple(name for name in (chosen, beside) if name in names)

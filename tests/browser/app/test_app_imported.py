@@ -54,6 +54,29 @@ def test_a_team_with_a_scenario_is_read_decided_and_asked_what_if(
         assert "fly?run=" in (tab.page.get_attribute("a:has-text('Watch the flight')", "href") or "")
 
 
+def test_a_point_of_the_front_is_chosen_by_mouse_and_keyboard(
+    browser: Browser, application: AppServer, teams: TeamStore
+) -> None:
+    team = _kept(teams, ROOT / "docs/examples/survey")
+    with watched_page(browser, viewport={"width": 360, "height": 700}) as tab:
+        _shown(tab, application, team, "decide")
+        tab.page.click(GO)
+        tab.page.wait_for_selector(".headline:has-text('point 1 of 8 on the Pareto front: energy 11 and risk 45')")
+        tab.page.click(".front .points a[href='#p4']")
+        tab.page.wait_for_selector(".headline:has-text('point 4 of 8 on the Pareto front: energy 17 and risk 26')")
+        tab.page.focus(".front svg a[href='#p6']")
+        tab.page.keyboard.press("Enter")
+        tab.page.wait_for_selector(".headline:has-text('point 6 of 8 on the Pareto front: energy 23 and risk 14')")
+        tab.page.wait_for_selector(".team-picture g:has-text('North'):has-text('2')")
+        tab.page.wait_for_selector(".front svg a[href='#p6']:focus")
+        assert tab.page.evaluate("document.documentElement.scrollWidth") <= 360
+        _shown(tab, application, team, "decide")
+        tab.page.wait_for_selector(".headline:has-text('point 6 of 8')")
+        _shown(tab, application, team, "seat")
+        tab.page.click("button:has-text('Start the game')")
+        tab.page.wait_for_selector("text=there are several objectives (energy, risk)")
+
+
 def test_without_a_solution_the_constraints_in_the_way_are_told_and_who_steps_aside(
     browser: Browser, application: AppServer, teams: TeamStore, tmp_path: Path
 ) -> None:

@@ -14,6 +14,7 @@ from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
 from robochoc.app.flights.saved_state import unpack_run
+from robochoc.app.imported.facts import facts_of
 from robochoc.app.sketch import files, open_from_disk
 from robochoc.app.sketch.building import decided, model_of
 from robochoc.app.sketch.example_sketches import KEYS, example
@@ -123,9 +124,10 @@ def test_a_file_more_or_less_is_a_change(folder: Path) -> None:
         open_team(folder)
 
 
-def test_a_team_with_several_objectives_is_refused() -> None:
-    with pytest.raises(InvalidInputError, match="several objectives, and the application requires a single cost"):
-        open_team(ROOT / "docs/examples/survey")
+def test_a_team_with_several_objectives_is_opened() -> None:
+    found = open_team(ROOT / "docs/examples/survey")
+    assert isinstance(found, ImportedTeam)
+    assert facts_of(found.team).objectives == ("energy", "risk")
 
 
 @looped("name", ["patrol", "rescue", "hangar"])

@@ -10,7 +10,7 @@ from robochoc.generators.heights import heights
 from robochoc.model.outcome import FrontPoint, Outcome, Verdict
 from robochoc.model.problem import Team
 from robochoc.run import Options, Runtime, solve
-from robochoc.view.front_page import MOST_SHOWN, front_page
+from robochoc.view.front_page import MOST_SHOWN, front_choice, front_page
 
 
 def page_of(team: Team, outcome: Outcome) -> str:
@@ -41,6 +41,15 @@ def test_there_is_a_chart_for_each_pair_of_objectives(names: tuple[str, ...], ch
     page = page_of(team, outcome)
     assert page.count("<svg") == charts
     assert "<&>" not in page
+
+
+def test_the_chosen_point_is_marked_in_a_choice() -> None:
+    points = [FrontPoint({"<a>": number, "b": -number}, {}) for number in range(2 * MOST_SHOWN)]
+    page = front_choice(points, 2)  # every other point is shown, and the chosen one
+    assert page.count("<circle") == MOST_SHOWN + 1
+    assert page.count('aria-current="true"') == 1
+    assert '<tr class=chosen><th scope="row"><a href="#p2" aria-current="true">2</a></th><td>1</td>' in page
+    assert "<a>" not in page
 
 
 def test_long_fronts_are_thinned() -> None:

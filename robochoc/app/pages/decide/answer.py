@@ -64,9 +64,9 @@ def _so_far(result: RunResult, state: RunState) -> str:
 
 
 def _cost(result: RunResult, *, worth: bool) -> str:
-    """Return the cost of an answer, or its utility if `worth`."""
-    if result.cost is None:
-        return ""
+    """Return the cost of an answer, or its utility if `worth`; of a Pareto front, the costs of the chosen point."""
+    if result.front or result.cost is None:
+        return result.point_in_words
     if result.verdict == "optimal" and not result.withdrawn:
         key = "imported.worth-proven" if worth else "decide.proven"
     else:

@@ -12,6 +12,7 @@ from nicegui.events import GenericEventArguments
 
 from robochoc.app.pages.decide.answer import effort, headline, show_costs, table_html
 from robochoc.app.pages.decide.conversation_player import ConversationPlayer
+from robochoc.app.pages.decide.front import show_front
 from robochoc.app.pages.decide.no_solution_panel import NoSolutionPanel
 from robochoc.app.pages.decide.picture import decides_places, falling_svg, targets_of, team_svg, values_of
 from robochoc.app.pages.decide.run_options_panel import RunOptionsPanel
@@ -255,6 +256,8 @@ class _Page:
                 ui.label(say("decide.why-chosen", protocol=shown.result.protocol, why=why)).classes("soft")
             if changed:
                 ui.label(say("decide.changed")).classes("changed")
+            if shown.result.front:
+                show_front(shown, shown.result)
             if shown.result.assignment:
                 table = (
                     answers_html(self._imported, shown.result) if self._imported else table_html(sketch, shown.result)

@@ -279,6 +279,8 @@ def _verdict(run: Run) -> str:
     key = result.verdict if result.verdict in _VERDICTS else "stopped" if run.state == RunState.STOPPED else "limit"
     if key in {"stopped", "limit"} and not result.assignment:
         return say("fly.verdict.nothing")
+    if result.front:
+        return say("fly.verdict.point", number=result.point + 1, points=f"{len(result.front):,}")
     words = [say(f"fly.verdict.{key}")]
     if result.withdrawn:
         words.append(say("fly.verdict.aside", count=len(result.withdrawn)))

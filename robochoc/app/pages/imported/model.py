@@ -62,7 +62,10 @@ def counts(facts: ImportedFacts) -> str:
             links=f"{facts.linked:,}",
         )
     ]
-    if facts.costs:
+    if facts.objectives:
+        each = "imported.sum-each-most" if facts.maximised else "imported.sum-each"
+        told.append(say(each, names=listed(facts.objectives)))
+    elif facts.costs:
         told.append(say("imported.sum-most" if facts.maximised else "imported.sum-least"))
     else:
         told.append(say("imported.all-hold"))

@@ -9,6 +9,7 @@ import msgspec
 import pytest
 
 from robochoc.app.flights.answer_check import check, claim_words
+from robochoc.app.flights.builder import of_chosen_point
 from robochoc.app.flights.flight_map import changed_to
 from robochoc.app.flights.saved_state import packed, unpack_run
 from robochoc.app.imported.picture import picture_sketch
@@ -19,11 +20,11 @@ from robochoc.app.sketch import edits
 from robochoc.app.sketch.open_from_disk import ImportedTeam, open_team
 from robochoc.app.sketch.sketch import Cell, Decision, DecisionKind, Sketch, SketchRobot, SketchRule
 from robochoc.formats import write_team
-from robochoc.formats.result import result_json
+from robochoc.formats.result import read_result, result_json
 from robochoc.model.assembly import assemble
 from robochoc.model.expression import Type, parse
 from robochoc.model.problem import Constraint, CostUnits, Domain, Function, ProblemKind, Variable
-from robochoc.run.options import Options
+from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
 from tests.support.cases import looped
 from tests.support.kept_runs import cube, kept_run
@@ -170,6 +171,33 @@ def test_that_teams_of_files_are_checked(tmp_path: Path, example: str, *, wrong:
     run.result = None
     check(run)
     assert run.record.checked is (Checked.BROKEN if wrong else Checked.KEPT)
+
+
+def test_each_point_of_a_front_is_checked_and_the_chosen_one_is_flown(tmp_path: Path) -> None:
+    files = ROOT / "docs/examples/survey"
+    found = open_team(files)
+    assert isinstance(found, ImportedTeam)
+    outcome = solve(found.team, Options(runtime=Runtime.SIMULATOR))
+    run = kept_run(tmp_path, picture_sketch(found))
+    shutil.copytree(files, run.team)
+    told = msgspec.json.decode(result_json(outcome))
+    (run.folder / "result.json").write_bytes(msgspec.json.encode(told) + b"\n")
+    run.result = None
+    assert _found(run) is Checked.KEPT
+    for place in (-1, 8, 5):  # the last one exists
+        run.choose_point(place)
+    result = run_of(run.folder).result
+    assert result is not None
+    assert (result.point, result.cost, result.objectives) == (5, 23, {"energy": 23, "risk": 14})
+    assert result.assignment == outcome.front[5].assignment
+    assert "point 6 of 8 on the Pareto front: energy 23 and risk 14" in result.point_in_words
+    flown = read_result(of_chosen_point(run) or b"")
+    assert flown is not None
+    assert (flown.assignment, flown.cost) == (result.assignment, 23)
+    told["front"][7]["objectives"]["risk"] = 9
+    (run.folder / "result.json").write_bytes(msgspec.json.encode(told) + b"\n")
+    run.result = None
+    assert _found(run) is Checked.COST
 
 
 @looped(("cost", "found"), [(3.5, Checked.KEPT), (3, Checked.COST), (-3.5, Checked.COST)])
