@@ -65,13 +65,14 @@ def read_domain(element: etree._Element, table: SymbolTable, places: int) -> Dom
         codes = codes_of(words, table)
         domain = Domain(name, tuple(range(code, code + 1) for code in codes), table.names)
     else:
-        domain = Domain(name, tuple(sorted(map(_range, words), key=lambda part: part.start)))
+        domain = Domain(name, tuple(sorted(map(read_range, words), key=lambda part: part.start)))
     check_domain(domain)
     check_count(element, "nbValues", len(domain))
     return domain
 
 
-def _range(word: str) -> range:
+def read_range(word: str) -> range:
+    """Return the integers of a range such as `1..4`, or of a single integer. Raises `MistakeError`."""
     match = _RANGE.fullmatch(word)
     if not match:
         hint = "write ranges of integers of at most 18 digits: 1..4 7 9..12"

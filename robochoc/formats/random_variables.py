@@ -8,7 +8,7 @@ from decimal import Decimal
 
 from lxml import etree
 
-from robochoc.formats.definition_reader import read_integer
+from robochoc.formats.definition_reader import read_integer, read_range
 from robochoc.formats.diagnostics import Diagnostic, DiagnosticCollector, MistakeError, shortened, suggestion
 from robochoc.formats.names import check_integer, check_name, check_unique
 from robochoc.formats.team_members import TeamMembers
@@ -18,14 +18,15 @@ from robochoc.model.problem import Constraint, ConstraintModel, RandomVariable, 
 from robochoc.model.uncertainty import Outcomes, declared_robots
 
 _PROBABILITY = re.compile(rf"(?:0|1|0?\.[0-9]{{1,{MAX_PLACES}}}|1\.0{{1,{MAX_PLACES}}})")
+_MOST_OUTCOMES = 10_000
 _FORM = "write probability:value, 0.3:1|0.7:2"
 _EXACT = f"use decimals of at most {MAX_PLACES} places with the sum 1: 0.333:1|0.333:2|0.334:3"
 
 
 def read_random(element: etree._Element) -> RandomVariable:
-    """Return the random variable in an element such as `<random name="wind">0.3:1|0.7:2</random>`.
+    """Return the random variable in an element such as `<random name="wind">0.3:1|0.07:2..11</random>`.
 
-    A probability applies to all values up to the next probability. Raises `MistakeError`.
+    A probability applies to each of the values up to the next probability. Raises `MistakeError`.
     """
     values: dict[int, Decimal] = {}
     current: Decimal | None = None
@@ -35,10 +36,13 @@ def read_random(element: etree._Element) -> RandomVariable:
             current = _probability(word.strip())
         if current is None:
             raise MistakeError(f"the outcome '{shortened(part.strip())}' has no probability", _FORM)
-        outcome = read_integer(value.strip())
-        if outcome in values:
-            raise MistakeError(f"the outcome {outcome} occurs twice", "add up its probabilities")
-        values[outcome] = current
+        outcomes = _outcomes(value.strip())
+        if len(values) + len(outcomes) > _MOST_OUTCOMES:
+            raise MistakeError(f"there are more than {_MOST_OUTCOMES:,} outcomes", "use fewer outcomes")
+        for outcome in outcomes:
+            if outcome in values:
+                raise MistakeError(f"the outcome {outcome} occurs twice", "add up its probabilities")
+            values[outcome] = current
     places = max((-int(one.normalize().as_tuple().exponent) for one in values.values()), default=0)
     weights = tuple(int(one.scaleb(max(places, 0))) for one in values.values())
     seen_by = tuple(attribute(element, "seen_by").split())
@@ -162,6 +166,13 @@ def _undeclared(members: TeamMembers, randoms: list[RandomVariable]) -> Iterator
                 robot_name = next(robot.name for robot in members.robots if one in robot.random)
                 message = f"seen_by of '{shortened(one.name)}' names '{shortened(name)}', which no robot has"
                 yield members.place(robot_name, one.name).mistake(message, suggestion(name, owned, "variables"))
+
+
+def _outcomes(word: str) -> range:
+    if ".." in word:
+        return read_range(word)
+    value = read_integer(word)
+    return range(value, value + 1)
 
 
 def _probability(word: str) -> Decimal:

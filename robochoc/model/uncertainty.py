@@ -290,7 +290,7 @@ class _Expectation:
         if self._parts > MAX_PARTS:
             raise UncertaintyError(
                 f"the variables, constraints and costs in all outcomes are more than {MAX_PARTS:,}",
-                "use fewer outcomes, smaller relations, or fewer variables in seen_by",
+                "use fewer outcomes or samples, smaller relations, or fewer variables in seen_by",
             )
 
 

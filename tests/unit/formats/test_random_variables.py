@@ -55,6 +55,8 @@ MISTAKES = [
     ('seen_by="relay">0.5:0|0<', "Relay.xml:11 the outcome 0 occurs twice"),
     ('seen_by="relay">3<', "Relay.xml:11 the outcome '3' has no probability"),
     ('seen_by="relay">0.7:0|0.3:gale<', "Relay.xml:11 'gale' is not an integer"),
+    ('seen_by="relay">0.0001:1..10001<', "Relay.xml:11 there are more than 10,000 outcomes"),
+    ('seen_by="relay">0.5:3..1<', "Relay.xml:11 the range 3..1 is empty"),
     ('seen_by="relay"><', "Relay.xml:11 the outcome '' has no probability"),
     ('seen_by="relay relay">0.7:0|0.3:3<', "Relay.xml:11 a variable occurs twice in seen_by"),
     ('seen_by="relay">0.6:0|0.4:3<', "Relay.xml:11 the random variable 'wind' differs from that of 'Camera'"),
@@ -68,6 +70,15 @@ def test_mistakes_have_their_line(written: str, message: str, tmp_path: Path) ->
     found = mistakes_in(folder, "Relay.xml", ('seen_by="relay">0.7:0|0.3:3<', written))
     assert found[0] == message
     assert not any("private constraint" in one for one in found), "a consequence of the mistake"
+
+
+def test_a_range_of_outcomes_is_a_uniform_distribution(tmp_path: Path) -> None:
+    folder = tmp_path / "t"
+    shutil.copytree(GUSTS, folder)
+    for path in folder.iterdir():
+        path.write_text(path.read_text().replace("0.7:0|0.3:3", "0.7:0|0.1:1..3"))
+    wind = read_team(folder)["Relay"].random[0]
+    assert (wind.outcomes, wind.weights) == ((0, 1, 2, 3), (7, 1, 1, 1))
 
 
 def test_mistakes_between_files(tmp_path: Path) -> None:
