@@ -51,10 +51,10 @@ class Findings(msgspec.Struct, frozen=True):
     """A robot's knowledge about the whole search; None for information that the robot or its protocol does not have.
 
     `bound` is a lower bound on the cost of every assignment of the robots that it covers (for a root: the robots of its
-    tree; for the first robot: all). `count` is the number of optima of a root's tree, in hexadecimal digits, because it
-    may need more than 64 bits; `listing` contains the robot's values in some of these optima; `points`
-    contains its values in the points of a Pareto front. `left` contains the
-    indices of the values that remain after preprocessing.
+    tree; for the first robot: all). `share` is a part of such a bound: the bound is the sum of all robots' shares.
+    `count` is the number of optima of a root's tree, in hexadecimal digits, because it may need more than 64 bits;
+    `listing` contains the robot's values in some of these optima; `points` contains its values in the points of a
+    Pareto front. `left` contains the indices of the values that remain after preprocessing.
     """
 
     best: Incumbent | None = None
@@ -65,6 +65,7 @@ class Findings(msgspec.Struct, frozen=True):
     count: str | None = None
     listing: Listing | None = None
     points: ListedPoints | None = None
+    share: float | None = None
 
 
 NO_FINDINGS = Findings()

@@ -105,7 +105,11 @@ def shortfalls_by_cycle(
 
 
 def lower_bound(findings: Mapping[str, Findings]) -> float | None:
-    """Return a lower bound of the cost of all assignments, or None if no robot has reported a bound."""
+    """Return a lower bound of the cost of all assignments, or None if robots have reported none, or not all shares."""
+    shares = [found.share for found in findings.values() if found.share is not None]
+    if shares and len(shares) == len(findings):
+        # The correctly rounded sum is never above an integer that the exact sum does not exceed.
+        return max(0, math.ceil(math.fsum(shares)))
     bounds = [found.bound for found in findings.values() if found.bound is not None]
     least = sum(bounds)
     return int(least) if bounds and least < INFINITE else None

@@ -302,7 +302,7 @@ def test_split_reweighted_or_not_what_is_proven_is_true_and_no_cycle_is_cheaper_
 def test_where_functions_are_to_be_split_or_reweighted_there_is_no_form_as_arrays() -> None:
     team = random_cost_team(Random(1), n_ary=False)
     options = Options(protocol="maxsum", runtime=Runtime.ARRAYS, settings={"split": "0.4"})
-    for settings in (options.settings, {"reweight": "0.5"}):
+    for settings in (options.settings, {"reweight": "0.5"}, {"diffusion": "yes"}):
         (name,) = settings
         with pytest.raises(UnsupportedError, match=f"maxsum with --set {name} has no array implementation"):
             solve(team, replace(options, settings=settings))

@@ -260,7 +260,11 @@ def _not_proven(team: Team, outcome: Outcome) -> str:
     if outcome.grids and outcome.cost is not None and outcome.bound is not None:
         gap, bound = abs(Decimal(outcome.cost) - Decimal(outcome.bound)), _number(outcome.bound)
         return f"{by} (at most {_number(gap)} from the {_best(team)}: {_side(team)} bound {bound})"
-    bound = f"; {_side(team)} bound {_number(outcome.bound)}" if by and outcome.bound else ""
+    bound = (
+        f"; {_side(team)} bound {_number(outcome.bound)}"
+        if outcome.bound and (by or not outcome.withdrawn_alive)
+        else ""
+    )
     return f"{by} (not proven to be the {_best(team)}{bound})"
 
 

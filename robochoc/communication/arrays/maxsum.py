@@ -193,7 +193,7 @@ class ArrayMaxSum(CycleRun):
     """A run of Max-Sum.
 
     Raises:
-        UnsupportedError: if functions are to be split or reweighted.
+        UnsupportedError: if functions are to be split or reweighted, or costs to be diffused.
     """
 
     in_blocks = True
@@ -203,8 +203,9 @@ class ArrayMaxSum(CycleRun):
         self, layout: ArrayLayout, settings: CycleCount, seed: int, *, clocks: bool = True, changes: bool = False
     ) -> None:
         settings = cast("MaxSumSettings", settings)
-        for name, used in (("split", settings.split > 0), ("reweight", settings.reweight != 1)):
-            if used:
+        defaults = MaxSumSettings()
+        for name in ("split", "reweight", "diffusion"):
+            if getattr(settings, name) != getattr(defaults, name):
                 raise UnsupportedError(f"maxsum with --set {name} has no array implementation: use --runtime simulator")
         super().__init__(layout, settings, seed, clocks=clocks, changes=changes)
         self._alone = [self._cost_alone(group) for group in layout.groups]

@@ -194,6 +194,8 @@ def fault_of_findings(findings: Findings, order: Collection[str]) -> str:
     costs = (findings.bound or 0, findings.best.cost if findings.best is not None else 0)
     if not all(0 <= cost <= INFINITE for cost in costs):
         return "it has reported impossible costs"
+    if findings.share is not None and not abs(findings.share) < INFINITE:
+        return "it has reported an impossible bound"
     if findings.count is not None and not HEXADECIMAL.fullmatch(findings.count):
         return "it has reported an invalid number"
     if findings.listing is not None and min(findings.listing.places, default=0) < 0:

@@ -11,12 +11,14 @@ the cost of each value in all other functions. A robot chooses the value with th
   values all cost `inf` proves that there is no solution.
 - **Parameters (`--set`)**: `damping` (the weight of the last Q in a new one; default 0.5), `preference` (the maximum
   random charge of a value; default 0.01), `split` (each function becomes two; default 0: no splitting), `reweight` (the
-  weight of functions in tree-reweighted Max-Sum; default 1: plain Max-Sum), `cycles` (default 100).
+  weight of functions in tree-reweighted Max-Sum; default 1: plain Max-Sum), `diffusion` (`yes`: max-sum diffusion, with
+  a lower bound; default `no`), `cycles` (default 100).
 - **References**: Farinelli, Rogers, Petcu, Jennings: "Decentralised coordination of low-power embedded devices using
   the max-sum algorithm", AAMAS 2008, Section 4; for damping and splitting: Cohen, Galiki, Zivan: "Governing convergence
   of Max-sum on DCOPs through damping and splitting", AIJ 279, 2020; for reweighting: Wainwright, Jaakkola, Willsky:
   "MAP estimation via agreement on trees: message-passing and linear programming", IEEE Transactions on Information
-  Theory 51(11), 2005.
+  Theory 51(11), 2005; for diffusion: Werner: "A linear programming approach to max-sum problem: a review", IEEE
+  Transactions on Pattern Analysis and Machine Intelligence 29(7), 2007, which attributes it to Kovalevsky and Koval.
 
 The methods correspond to the first paper's equations:
 
@@ -26,6 +28,7 @@ The methods correspond to the first paper's equations:
     preferences gamma                  `preferred`
     split constraint factor graph      `_split`
     edge appearance probability        `reweight`
+    max-sum diffusion                  `maxsum_diffusion.py`
 
 The lowest-priority robot in the scope of a function holds it, because only this robot knows the constraint. Messages
 between nodes of the same robot are not sent. In a cycle all functions send R, then all variables send Q. All messages
@@ -46,6 +49,15 @@ probability that a random spanning tree contains the function, so each function 
 knows. Here all functions have the same weight: in a graph with n robots and m functions, the mean is (n - 1) / m. On a
 tree it is 1, and other weights may miss the optimum. On most graphs with cycles, weights below 1 make answers more
 expensive. No bound is reported, although the paper's messages yield one.
+
+With `diffusion=yes`, a robot's Q to a function is Z / (d + 1) without R, where d is the number of its functions. The
+least cost of a value then becomes the same in the robot's variable and in all its functions, and the sum of all minima
+is a lower bound, which the result contains (`maxsum_diffusion.py`). If the best cost equals the bound, it is proven
+optimal, on trees after enough cycles. With `damping` 0.5 or more the bound does not fall, if functions have two robots;
+preferences and rounding change it a little. Elsewhere the relaxation has a gap, which further cycles do not close, and
+answers cost more than those of plain Max-Sum. In the paper, one variable and one function are averaged at a time; here
+all robots act in the same cycle, and each knows only the messages of its neighbours. The robots send nothing in
+addition: each reports its share of the bound at the end. If a message is lost, there is no bound.
 
 Choices that the paper leaves open, and differences:
 
@@ -68,12 +80,16 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
+
+import msgspec
 
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols import message as wire
 from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.findings import Findings
+from robochoc.protocols.inference.maxsum_diffusion import divided, rounded, share_of_bound
 from robochoc.protocols.inference.maxsum_factor import Factor, Row, cheapest, from_zero, total, weighted, without_each
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.anytime import AnytimeMessage
@@ -95,12 +111,14 @@ class MaxSumSettings(CycleSettings, frozen=True):
 
     `split`: each function becomes two, and the share of each entry is drawn from `split` to 1 - `split`. 0: no split.
     `reweight`: the weight of functions in tree-reweighted Max-Sum. 1: plain Max-Sum.
+    `diffusion`: true for max-sum diffusion, which has a lower bound; not with `split` or `reweight`.
     """
 
     damping: float = 0.5
     preference: float = 0.01
     split: float = 0.0
     reweight: float = 1.0
+    diffusion: Literal["no", "yes"] = "no"
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -112,6 +130,8 @@ class MaxSumSettings(CycleSettings, frozen=True):
             raise ValueError(f"split is {self.split:g}; it must be from 0 (none) to {MAX_SPLIT:g} (halves)")
         if not LEAST_WEIGHT <= self.reweight <= 1:
             raise ValueError(f"reweight is {self.reweight:g}; it must be from {LEAST_WEIGHT:g} to 1 (plain Max-Sum)")
+        if self.diffusion == "yes" and (self.split or self.reweight != 1):
+            raise ValueError("diffusion cannot be combined with split or reweight: leave them out")
 
 
 class R(wire.Message, frozen=True):
@@ -216,12 +236,27 @@ class MaxSum(FactorGraphProtocol):
         self._made = False
         self._shape: list[tuple[str, int]] = []
         """The number of `edges` of each robot."""
+        self._has_all = True
+        """False after a phase without all its messages: then the robots' shares of the bound do not belong together."""
+        self._share: float | None = None
+
+    @property
+    def findings(self) -> Findings:
+        """This robot's value in every cycle, and with `diffusion` its share of the bound, after the last cycle."""
+        found = super().findings
+        return found if self._share is None else msgspec.structs.replace(found, share=self._share)
+
+    def start(self) -> None:
+        super().start()
+        if not self.problem.neighbours:
+            self._record_share()
 
     def start_cycles(self) -> None:
         self.start_with(self.settings.preference)
 
     def _receive_domains(self, messages: Mapping[str, wire.Message]) -> None:
         self._domains = self.checked_domains(messages)
+        self._has_all &= len(messages) == len(self.above)
         self._send_r()
 
     def _make_functions(self) -> None:
@@ -251,6 +286,7 @@ class MaxSum(FactorGraphProtocol):
 
     def _receive_q(self, messages: Mapping[str, wire.Message]) -> None:
         """Process all Q received in the cycle."""
+        self._has_all &= len(messages) == len(self.above)
         for name, message in messages.items():
             self._record(name, message)
         self._send_r()
@@ -292,6 +328,7 @@ class MaxSum(FactorGraphProtocol):
 
     def _decide(self, messages: Mapping[str, wire.Message]) -> None:
         """Choose the value with the lowest cost in all R, and send Q."""
+        self._has_all &= len(messages) == len(self.below)
         for name, message in messages.items():
             self._record(name, message)
         received = {name: self._last_r[name] for name in self.below if name in self._last_r}
@@ -303,6 +340,7 @@ class MaxSum(FactorGraphProtocol):
             return
         self.choose(cheapest(z))
         if self.finished:
+            self._record_share()
             return
         self.edges = self._q(rows, z, damped=before == self._shape)
         done = len(self.factors)
@@ -320,15 +358,27 @@ class MaxSum(FactorGraphProtocol):
 
     def _q(self, rows: Sequence[Row], z: Row, *, damped: bool) -> list[Row]:
         """Return, for each of `rows`, the cost of each value without that row (Q)."""
+        if self.settings.diffusion == "yes":
+            before = self.edges if damped else [[0.0] * len(z) for _ in rows]
+            return [rounded(row) for row in self._damped(before, divided(rows, z))]
         fresh = without_each(self.preferred, rows, z, weight=self.settings.reweight)
+        return self._damped(self.edges, fresh) if damped else [from_zero(row) for row in fresh]
+
+    def _damped(self, before: Sequence[Row], fresh: Sequence[Row]) -> list[Row]:
+        """Return the weighted means of the last Q and new ones, which are shifted to a minimum of 0."""
         damping = self.settings.damping
-        if not damped or not damping:
+        if not damping:
             return [from_zero(row) for row in fresh]
         rest = 1 - damping
         return [
-            [damping * old + rest * new for old, new in zip(before, from_zero(row), strict=True)]
-            for before, row in zip(self.edges, fresh, strict=True)
+            [damping * old + rest * new for old, new in zip(last, from_zero(row), strict=True)]
+            for last, row in zip(before, fresh, strict=True)
         ]
+
+    def _record_share(self) -> None:
+        """Compute this robot's share of the lower bound, if no message is missing."""
+        if self.settings.diffusion == "yes" and self._has_all and self.problem.values:
+            self._share = share_of_bound(self.problem.costs({}), self.edges, self._own)
 
     def _with(self, name: str) -> list[Factor]:
         return [factor for factor in self.factors if name in factor.agents]

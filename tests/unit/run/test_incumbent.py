@@ -214,7 +214,7 @@ def test_where_the_sum_is_maximised_the_best_is_a_maximum_and_bounds_are_upper_o
     robots = tuple(replace(robot, costs=CostUnits(maximize=True)) for robot in PAIR.robots)
     team = replace(PAIR, robots=robots)
     found = outcome_of({"A": 1, "B": 2}, protocol="dsa", cost=3, verified=True, bound=9)
-    assert "cost 3 (not proven to be the maximum), checked" in outcome_report(team, found)
+    assert "cost 3 (not proven to be the maximum; upper bound 9), checked" in outcome_report(team, found)
     timely = replace(found, deadline=2)
     assert "by the deadline of 2 s (not proven to be the maximum; upper bound 9), checked" in outcome_report(
         team, timely
