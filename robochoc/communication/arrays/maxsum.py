@@ -203,9 +203,13 @@ class ArrayMaxSum(CycleRun):
         self, layout: ArrayLayout, settings: CycleCount, seed: int, *, clocks: bool = True, changes: bool = False
     ) -> None:
         settings = cast("MaxSumSettings", settings)
-        defaults = MaxSumSettings()
-        for name in ("split", "reweight", "diffusion"):
-            if getattr(settings, name) != getattr(defaults, name):
+        refused = {
+            "split": settings.split > 0,
+            "reweight": settings.reweight != 1,
+            "diffusion": settings.diffusion == "yes",
+        }
+        for name, used in refused.items():
+            if used:
                 raise UnsupportedError(f"maxsum with --set {name} has no array implementation: use --runtime simulator")
         super().__init__(layout, settings, seed, clocks=clocks, changes=changes)
         self._alone = [self._cost_alone(group) for group in layout.groups]
