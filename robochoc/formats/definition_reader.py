@@ -24,9 +24,10 @@ from robochoc.formats.real_numbers import REAL_KINDS, read_real_domain, read_val
 from robochoc.formats.symbols import SymbolTable, codes_of
 from robochoc.formats.xml import attribute, line
 from robochoc.model.expression import Expression, ExpressionError, SymbolNames, Type, parse
-from robochoc.model.expression.fixed_point import VALUE_PLACES, fixed_point
+from robochoc.model.expression.fixed_point import fixed_point
 from robochoc.model.problem import INFINITE, CostUnits, Domain, Function, Predicate, Relation, Semantics, Topic
 from robochoc.model.real import RealParameters
+from robochoc.model.waypoints import waypoint
 
 _INTEGER = re.compile(r"[+-]?[0-9]{1,18}")
 _NUMERIC = re.compile(r"[-+.0-9]+$")
@@ -179,25 +180,23 @@ def read_topic(
     """Return a topic. Its `x`, `y`, `z` are integer expressions over the robot's own `variables`.
 
     The `symbolic` variables can only be compared with symbols; `code` returns the code of a symbol. `reals` are the
-    real variables with their decimal places: the coordinates of a topic over them have `VALUE_PLACES` places. Raises
-    `MistakeError`.
+    real variables with their decimal places: if there are some, coordinates may have decimals. Raises `MistakeError`.
     """
     given: dict[str, Expression] = {}
-    sources: dict[str, Expression] = {}
-    places = VALUE_PLACES if reals[0] else 0
     for axis in ("x", "y", "z"):
         body = element.get(axis)
         if body is not None:
             try:
                 symbols = SymbolNames(symbolic, _unparsed_if_unknown(code)) if symbolic else None
-                given[axis] = sources[axis] = parse(body, variables, Type.INTEGER, symbols, decimals=bool(reals[0]))
-                if reals[0]:
-                    given[axis] = fixed_point(sources[axis], *reals, Type.INTEGER, places)
+                given[axis] = parse(body, variables, Type.INTEGER, symbols, decimals=bool(reals[0]))
             except ExpressionError as error:
                 raise expression_mistake(f"{axis} of the topic", error) from None
     kind = attribute(element, "type") or Topic.type
-    found = tuple(map(sources.get, "xyz")) if reals[0] else ()
-    return Topic(attribute(element, "name"), kind, given.get("x"), given.get("y"), given.get("z"), found, places)
+    sources = given.get("x"), given.get("y"), given.get("z")
+    try:
+        return waypoint(attribute(element, "name"), kind, sources, *reals)
+    except ExpressionError as error:
+        raise expression_mistake("position of the topic", error) from None
 
 
 def _unparsed_if_unknown(code: Callable[[str], int]) -> Callable[[str], int]:

@@ -19,6 +19,7 @@ from robochoc.model.expression import Constant, Name, Type, parse
 from robochoc.model.expression.fixed_point import VALUE_PLACES, fixed_point
 from robochoc.model.problem import ProblemKind, Team, Topic
 from robochoc.model.real import RealInterval, RealParameters, grid
+from robochoc.model.waypoints import waypoint
 
 if TYPE_CHECKING:
     from robochoc.maps.reachability.free_area import Rectangle
@@ -79,7 +80,11 @@ class Drones:
         """Add a drone with its home, outside of some rectangles in metres."""
         own = _position_of(drone)
         self._owned[f"Robot{drone}"] = [Variable(name, domain) for name, domain in zip(own, domains, strict=True)]
-        self._topics[f"Robot{drone}"] = (_waypoint(f"/robot{drone}/waypoint", own),)
+        self._topics[f"Robot{drone}"] = (
+            waypoint(
+                f"/robot{drone}/waypoint", Topic.type, (Name(own[0]), Name(own[1]), Constant(HEIGHT)), own, PLACES
+            ),
+        )
         a, b = map(_decimal, home)
         near = _function(f"home{drone}", ("X", "Y"), f"(sqr(X - {a}) + sqr(Y - {b})) * 0.1")
         self._constraints.append(Constraint(near.name, near, own, own))
@@ -106,12 +111,6 @@ class Drones:
 
 def _position_of(drone: int) -> tuple[str, str]:
     return f"x{drone}", f"y{drone}"
-
-
-def _waypoint(name: str, own: tuple[str, str]) -> Topic:
-    sources = (Name(own[0]), Name(own[1]), Constant(HEIGHT))
-    x, y, z = (fixed_point(one, own, PLACES, Type.INTEGER, VALUE_PLACES) for one in sources)
-    return Topic(name, x=x, y=y, z=z, sources=sources, places=VALUE_PLACES)
 
 
 def _is_outside(rectangle: Rectangle) -> str:

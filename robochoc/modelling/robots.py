@@ -7,13 +7,15 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Never
 
 from robochoc.formats.names import MAX_NAME, MAX_WEIGHT, RESERVED, is_name
-from robochoc.model.expression import Expression
+from robochoc.model.expression import Expression, ExpressionError
 from robochoc.model.problem import Topic
 from robochoc.model.real import DEFAULT_POINTS
+from robochoc.model.waypoints import Sources, waypoint
 from robochoc.modelling.codes import DomainCodes, codes_of, real_codes
 from robochoc.modelling.constraints import ModelConstraint
 from robochoc.modelling.errors import ModelError, ModelTypeError, SourceLine, UnknownNameError, calling_line
 from robochoc.modelling.numbers import whole_number
+from robochoc.modelling.real_terms import RealTranslator
 from robochoc.modelling.terms import ModelVariable, number
 from robochoc.modelling.translation import Translator, UntranslatableError
 from robochoc.system.suggestions import did_you_mean
@@ -149,7 +151,12 @@ class ModelRobot:
             ModelError: if the robot has a variable with this name, or an argument is invalid.
         """
         place = calling_line()
-        return self._created(name, real_codes(low, high, precision, points, place), place, qualified=qualified)
+        codes = real_codes(low, high, precision, points, place)
+        for other in self.variables.values():
+            if codes.real and other.codes.real and codes.real.places != other.codes.real.places:
+                message = f"{name} and {other!r} are real variables of different precisions"
+                raise ModelError(message, "use the same precision for all real variables", place)
+        return self._created(name, codes, place, qualified=qualified)
 
     def _created(self, name: str, codes: DomainCodes, place: SourceLine, *, qualified: bool) -> ModelVariable:
         """Return a new variable, which is added to the robot. Raises `ModelError` if its name is invalid or taken."""
@@ -217,7 +224,19 @@ class ModelRobot:
         Raises:
             ModelError: if a term contains other robots' variables, or files cannot express it.
         """
-        self.add_topics(Topic(name, type, self._axis(x), self._axis(y), self._axis(z)))
+        self.add_topics(self._waypoint(name, type, (self._axis(x), self._axis(y), self._axis(z))))
+
+    def _waypoint(self, name: str, kind: str, sources: Sources) -> Topic:
+        try:
+            return waypoint(name, kind, sources, *self._reals)
+        except ExpressionError as error:
+            raise ModelError(f"files cannot express the position on {name}: {error}", error.hint) from None
+
+    @property
+    def _reals(self) -> tuple[list[str], int]:
+        """The names of this robot's real variables, and their decimal places."""
+        real = {one.name: one.codes.real.places for one in self.variables.values() if one.codes.real}
+        return [*real], max(real.values(), default=0)
 
     def _axis(self, value: object) -> Expression | None:
         if value is None:
@@ -225,14 +244,13 @@ class ModelRobot:
         term = number(value)
         if foreign := [one for one in term.variables if one.owner != self.name]:
             raise ModelError(f"{foreign[0]!r} is not a variable of {self.name}", "use this robot's variables")
-        if any(one.codes.real for one in term.variables):
-            raise ModelError(f"the position {term!r} is a real number", "write the topic into the robot's saved file")
+        translator = RealTranslator if self._reals[0] else Translator
         try:
-            scaled = Translator({one: one.name for one in term.variables}).number(term)
+            scaled = translator({one: one.name for one in term.variables}).number(term)
         except UntranslatableError:
             scaled = None
         if scaled is None or scaled.divisor != 1:
-            hint = "write it with integers and operators; for parts of a metre, use smaller units and --scale"
+            hint = "write it with integers and operators; for parts of a metre, use real variables or --scale"
             raise ModelError(f"files cannot express the position {term!r}", hint)
         return scaled.expression
 

@@ -17,6 +17,7 @@ from robochoc.model.expression import evaluate
 from robochoc.model.expression.fixed_point import fixed_point
 from robochoc.model.expression.tree import Type
 from robochoc.model.problem import Team
+from robochoc.model.waypoints import position
 from robochoc.modelling.real_terms import RealTranslator
 from robochoc.modelling.terms import Term, number
 from tests.support.cases import looped
@@ -94,7 +95,8 @@ def test_private_parts_and_integers() -> None:
     (lambda m: m.minimize(m["A.x"] + m["A.x"] ** m["A.x"]), "(A.x ** A.x) can be expressed only as a table"),
     (lambda m: m.minimize(m["A.x"] ** 9), "more than 18 decimal places"),
     (lambda m: m.add(m["A.x"] <= m.robots["A"].real("y", 0, 1, precision=0.1)), "different precisions"),
-    (lambda m: m.robots["A"].topic("/goal", x=m["A.x"]), "the position A.x is a real number"),
+    (lambda m: m.robots["A"].topic("/goal", x=m["A.x"] ** m["A.x"]), "files cannot express the position"),
+    (lambda m: m.robots["A"].topic("/goal", x=m["A.x"] ** 9), "more than 18 decimal places"),
 ])  # fmt: skip
 def test_mistakes_are_reported(wrong: Callable[[robochoc.Model], object], message: str) -> None:
     model = robochoc.Model("wrong")
@@ -107,3 +109,16 @@ def test_mistakes_are_reported(wrong: Callable[[robochoc.Model], object], messag
     with pytest.raises(ModelError, match=re.escape(message)) as caught:
         team()
     assert str(caught.value).startswith(f"{__file__}:")
+
+
+def test_positions_of_robots_are_exact(tmp_path: Path) -> None:
+    model = robochoc.Model("drone")
+    robot = model.robot("A")
+    x, level = robot.real("x", 0, 10, precision=0.01), robot.variable("level", range(3))
+    robot.topic("/goal", x=x * 2 + 0.5, y=level, z=1.5)
+    robot.topic("/level", x=level, y=0, z=0)
+    team = model.team
+    values = {"A.x": 137, "A.level": 2}
+    assert [position(topic, values) for topic in team["A"].topics] == [(3.24, 2, 1.5), (2, 0, 0)]
+    model.save(tmp_path / "drone")
+    assert read_team(tmp_path / "drone") == team
