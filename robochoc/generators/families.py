@@ -235,10 +235,13 @@ def swarm_on_map(
     radius: float = 0.2,
     speed: float = 0.5,
     points: int = swarms.POINTS,
+    targets: int = 0,
     seed: int = 0,
 ) -> Team:
     """Return a swarm of drones with real positions on a map: see `generators/maps/swarm_on_map.py`."""
-    team, _ = map_swarms.swarm_on_map(map, agents=agents, at=at, radius=radius, speed=speed, points=points, seed=seed)
+    team, _ = map_swarms.swarm_on_map(
+        map, agents=agents, at=at, radius=radius, speed=speed, points=points, targets=targets, seed=seed
+    )
     return team
 
 

@@ -57,6 +57,7 @@ def swarm(*, agents: int, side: int = 10, points: int = 9, seed: int = 0) -> Tea
         drones.add(drone, (domain, domain), home)
         if drone > 1:
             drones.keep(drone, (random_integer(chance, -most // 4, most // 4) for _ in range(2)))
+            drones.separate(drone)
     return drones.team(f"swarm-{agents}-{side}" + f"-{points}" * (points != POINTS) + f"-{seed}")
 
 
@@ -93,12 +94,25 @@ class Drones:
             self._constraints.append(Constraint(free.name, free, own, own))
 
     def keep(self, drone: int, displacement: Iterable[int]) -> None:
-        """Add the displacement of a drone from the drone above it, and the distance between both."""
+        """Add the displacement of a drone from the drone above it."""
         a, b = map(_decimal, displacement)
-        keep = _function(f"keep{drone}", self._apart.parameters, f"sqr(X2 - X1 - {a}) + sqr(Y2 - Y1 - {b})")
+        self._charge(f"keep{drone}", drone, f"sqr(X2 - X1 - {a}) + sqr(Y2 - Y1 - {b})")
+
+    def cover(self, target: int, place: tuple[int, int], drone: int) -> None:
+        """Add a target, which costs its squared distance from the nearer of a drone and the drone above it."""
+        a, b = map(_decimal, place)
+        distances = [f"sqr(X{number} - {a}) + sqr(Y{number} - {b})" for number in (1, 2)]
+        self._charge(f"target{target}", drone, f"min({', '.join(distances)})")
+
+    def separate(self, drone: int) -> None:
+        """Keep a drone and the drone above it 0.5 m apart."""
         scope = (*_position_of(drone // 2), *_position_of(drone))
-        self._constraints.append(Constraint(keep.name, keep, scope, scope))
         self._constraints.append(Constraint(f"apart{drone}", self._apart, scope, scope))
+
+    def _charge(self, name: str, drone: int, cost: str) -> None:
+        scope = (*_position_of(drone // 2), *_position_of(drone))
+        function = _function(name, self._apart.parameters, cost)
+        self._constraints.append(Constraint(name, function, scope, scope))
 
     def team(self, name: str) -> Team:
         """Return the team of all drones."""

@@ -1,14 +1,18 @@
 """Swarms on a map: drones that choose real positions in the free space, outside of walls.
 
 The costs are those of `generators/swarm.py`, but displacements are near those between homes, so that the formation fits
-on the map. Hard constraints forbid each pixel in which a drone does not fit everywhere, or which it cannot reach.
+on the map. Instead of a formation, drones can place sensors: random targets cost their squared distances from the
+nearer of two drones. This is the locational optimisation of Cortes, Martinez, Karatas and Bullo, "Coverage control for
+mobile sensing networks", IEEE Transactions on Robotics and Automation 20 (2004), limited to pairs of drones.
+
+Hard constraints forbid each pixel in which a drone does not fit everywhere, or which it cannot reach.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from math import ceil, floor
 from pathlib import Path
 from random import Random
 
@@ -44,6 +48,7 @@ def swarm_on_map(
     radius: float = 0.2,
     speed: float = 0.5,
     points: int = POINTS,
+    targets: int = 0,
     seed: int = 0,
 ) -> tuple[Team, GroundMap]:
     """Return a swarm of drones on a map of the ground, and the map in the form for flights.
@@ -55,13 +60,18 @@ def swarm_on_map(
         radius: The radius of a drone in metres, which is also its minimum distance from walls.
         speed: The speed of drones in m/s.
         points: The number of points of the first grid along the longer side of the map.
+        targets: The number of targets of a sensor placement. 0: a formation.
         seed: The same seed gives the same problem on every machine.
 
     Raises:
         InvalidInputError: The file is not a valid map.
         ValueError: A number is out of bounds, the map is rotated or has three dimensions, or drones do not fit.
     """
-    check_bounds({"agents": (agents, 1, MAX_ROBOTS), "points": (points, 2, MOST_SIDE)})
+    check_bounds(
+        {"agents": (agents, 1, MAX_ROBOTS), "points": (points, 2, MOST_SIDE), "targets": (targets, 0, MOST_SIDE)}
+    )
+    if targets and agents == 1:
+        raise ValueError("targets is not 0; sensor placement requires at least 2 robots")
     size, fast = exact("radius", radius, 0, 100), exact("speed", speed, 0.001, 100)
     starts = places_in(at, "at")
     if starts and len(starts) != agents:
@@ -80,11 +90,19 @@ def swarm_on_map(
     for drone, area in enumerate(areas, 1):
         homes.append(area.random_place(chance, homes))
         drones.add(drone, area.domains(drone, step), homes[-1], area.forbidden)
-        if drone > 1:
+        if drone > 1 and not targets:
             apart = (own - above for own, above in zip(homes[-1], homes[drone // 2 - 1], strict=True))
             drones.keep(drone, [part + random_integer(chance, -_DEVIATION, _DEVIATION) for part in apart])
+        if drone > 1:
+            drones.separate(drone)
+    for target in range(1, targets + 1):
+        drone = random_integer(chance, 2, agents)
+        place = areas[drone - 1].random_place(chance)
+        distances = {number: math.dist(place, home) for number, home in enumerate(homes, 1)}
+        drones.cover(target, place, max(2, min(distances, key=distances.__getitem__)))
     named = {f"Robot{number}": start for number, start in enumerate(starts, 1)}
-    name = f"swarm-{label_of(map)}-{agents}" + f"-{points}" * (points != POINTS) + f"-{seed}"
+    name = f"swarm-{label_of(map)}-{agents}" + f"-{points}" * (points != POINTS)
+    name += f"-targets{targets}" * bool(targets) + f"-{seed}"
     return drones.team(name), ground_on(cells, named, size, fast)
 
 
@@ -98,7 +116,7 @@ class _Area:
 
     def __init__(self, grid: OccupancyGrid, allowed: Flags) -> None:
         self.spans: list[tuple[int, int]] = [
-            (ceil(low * _UNIT), floor(high * _UNIT)) for low, high in bounds_of(grid, allowed)
+            (math.ceil(low * _UNIT), math.floor(high * _UNIT)) for low, high in bounds_of(grid, allowed)
         ]
         self.forbidden = forbidden_area(grid, allowed)
 
@@ -110,12 +128,12 @@ class _Area:
     def domains(self, drone: int, step: float) -> tuple[Domain, Domain]:
         """Return the domains of a drone's x and y, with grids whose step is at most `step` hundredths of a metre."""
         x, y = (
-            real_domain(f"{axis}{drone}", low, high, ceil((high - low) / step) + 1)
+            real_domain(f"{axis}{drone}", low, high, math.ceil((high - low) / step) + 1)
             for axis, (low, high) in zip("XY", self.spans, strict=True)
         )
         return x, y
 
-    def random_place(self, chance: Random, others: Sequence[tuple[int, int]]) -> tuple[int, int]:
+    def random_place(self, chance: Random, others: Sequence[tuple[int, int]] = ()) -> tuple[int, int]:
         """Return a random place, at least `_APART_M` from `others`, in hundredths of a metre.
 
         Raises:

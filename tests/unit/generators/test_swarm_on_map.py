@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from fractions import Fraction
 from pathlib import Path
 from random import Random
@@ -20,8 +21,8 @@ from robochoc.maps.ground_map import ground_map_json, read_ground_map
 from robochoc.maps.routes.distances import norms
 from robochoc.maps.routes.wall_plan import wall_plan_of
 from robochoc.maps.walls import walls_of
-from robochoc.model.expression import evaluate
-from robochoc.model.problem import Predicate, Team
+from robochoc.model.expression import evaluate, text
+from robochoc.model.problem import Function, Predicate, Team
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
 from tests.support.examples import count, drawn
@@ -72,6 +73,21 @@ def test_goals_are_the_numbers_of_the_answer(tmp_path: Path) -> None:
     assert [goal.at for goal in goals.values()] == [(numbers[f"x{n}"], numbers[f"y{n}"], 1) for n in (1, 2, 3)]
 
 
+def test_sensors_are_placed_near_targets() -> None:
+    team, _ = swarm_on_map(BUILDING, agents=2, points=5, targets=3)
+    check_team(team)
+    values = random_positions(team, drawn("sensors"))
+    costs = [one.definition for one in team.constraints() if one.name.startswith("target")]
+    places = [(values["x1"], values["y1"]), (values["x2"], values["y2"])]
+    for cost in costs:
+        assert isinstance(cost, Function)
+        body = text(cost.real.source) if cost.real and cost.real.source else ""
+        x, y = (100 * float(part) for part in re.findall(r"sub\([XY]1,([\d.]+)\)", body))
+        nearest = min(math.dist((x, y), place) for place in places)
+        row = [part for place in places for part in place]
+        assert evaluate(cost.body, dict(zip(cost.parameters, row, strict=True))) == pytest.approx(100 * nearest**2)
+
+
 def test_goals_without_a_map_are_exact_and_in_metres() -> None:
     team = swarm(agents=2, side=100)
     values = {"x1": 137, "y1": 9_999, "x2": 160, "y2": 9_951}
@@ -109,5 +125,7 @@ def test_unusable_maps_and_starts_are_refused() -> None:
         swarm_on_map(BUILDING, agents=2, at="1,1")
     with pytest.raises(ValueError, match="robot 1 at 0,0 does not fit there"):
         swarm_on_map(BUILDING, agents=1, at="0,0")
+    with pytest.raises(ValueError, match="sensor placement requires at least 2 robots"):
+        swarm_on_map(BUILDING, agents=1, targets=3)
     with pytest.raises(ValueError, match="no pixel is free"):
         swarm_on_map(BUILDING, agents=1, radius=5)

@@ -206,16 +206,18 @@ def patrol(**problem: Any) -> TeamOnMap:  # noqa: ANN401 - `patrol`'s own
 @measure_option("--radius", "Radius of a drone, which is also its minimum distance from walls.", 0.2)
 @measure_option("--speed", "Speed of drones, in metres per second.", 0.5, "M/S")
 @number_option("--points", "Points of the first grid along the longer side.", least=2, most=1000, default=9)
+@number_option("--targets", "Number of targets that drones watch; 0: they form a formation.", least=0, default=0)
 @seed_option
-@writes_team("swarm-MAP-AGENTS[-POINTS]-SEED")
+@writes_team("swarm-MAP-AGENTS[-POINTS][-targetsTARGETS]-SEED")
 def swarm_on_map(**problem: Any) -> TeamOnMap:  # noqa: ANN401 - `swarm_on_map`'s own
-    """Drones on a map choose real positions near their homes, and in a formation with their neighbours.
+    """Drones on a map choose real positions near their homes, in a formation or near targets.
 
     Positions are outside of walls, and can be reached from the drone's start. Costs are squares of distances, as in
     `robochoc generate swarm`. Robot3 has the variables x3 and y3, in metres with a precision of 0.01.
 
     \b
     robochoc generate swarm-on-map --map building.yaml --agents 4
+    robochoc generate swarm-on-map --map building.yaml --agents 4 --targets 12
     """  # noqa: D301 - \b keeps click from wrapping the lines
     from robochoc.generators.maps.swarm_on_map import swarm_on_map as on_map
 
