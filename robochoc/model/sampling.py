@@ -143,8 +143,10 @@ def can_be_infinite(constraint: Constraint) -> bool:
 
 def _can_be_undefined(expression: Expression) -> bool:
     match expression:
-        case Apply("div" | "mod", (dividend, Constant(divisor))) if divisor:
-            return _can_be_undefined(dividend)
+        case Apply("div" | "mod", (operand, Constant(number))) if number:
+            return _can_be_undefined(operand)
+        case Apply("pow", (operand, Constant(number))) if number >= 0:
+            return _can_be_undefined(operand)
         case Apply(operator, arguments):
             return operator in {"div", "mod", "pow"} or any(map(_can_be_undefined, arguments))
         case _:

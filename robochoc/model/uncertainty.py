@@ -335,7 +335,8 @@ def _check_number(randoms: Sequence[RandomVariable], what: str, line: int = 0) -
     if number > MAX_OUTCOMES:
         raise UncertaintyError(
             f"{what} depends on {counted(number, 'joint outcome')} of {named(randoms)}",
-            f"use at most {MAX_OUTCOMES:,}: fewer outcomes, or fewer random variables; only finite costs are sampled",
+            f"use at most {MAX_OUTCOMES:,}: fewer outcomes, or fewer random variables;"
+            " hard constraints, and quotients by variables, are not sampled",
             line,
         )
     return number

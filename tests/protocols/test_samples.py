@@ -15,7 +15,7 @@ from robochoc.formats.result import read_result, result_json
 from robochoc.model.outcome import BEST_FOR_SAMPLES, Verdict
 from robochoc.model.policies import Risk
 from robochoc.model.problem import AddConstraint, Constraint, ScenarioEvent
-from robochoc.model.sampling import Samples, sample_number
+from robochoc.model.sampling import Samples, can_be_infinite, sample_number
 from robochoc.model.uncertainty import is_uncertain
 from robochoc.replay import replay
 from robochoc.run.options import Options, Runtime
@@ -154,6 +154,16 @@ def test_a_team_with_many_outcomes_is_written_and_read_again(tmp_path_factory: p
 def test_estimates_prove_nothing(options: dict[str, object], why: str) -> None:
     with pytest.raises(UnsupportedError, match=why):
         solve(fleet(10).team, replace(SIMULATED, **options))  # type: ignore[arg-type]
+
+
+def test_powers_and_quotients_by_numbers_are_sampled() -> None:
+    model = robochoc.Model("powers")
+    gust = model.random("gust", {0: 0.5, 1: 0.3, 3: 0.2})
+    place = model.robot("one").variable("place", range(1, 4))
+    model.minimize((gust + place) ** 2 // 3 + abs(gust * 2 - place))
+    assert not any(map(can_be_infinite, model.team.constraints()))
+    model.minimize(6 // (place + gust))
+    assert any(map(can_be_infinite, model.team.constraints()))
 
 
 def test_samples_need_random_variables() -> None:
