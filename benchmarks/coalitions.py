@@ -3,14 +3,15 @@
     python benchmarks/coalitions.py [PROBLEMS]
 
 First the messages, bytes and CPU time of a comparison in PC-SyncBB, and the number of comparisons in an open search (5
-values, density .3, costs up to 10), which is counted on known costs, since some searches would take hours; then whole
-runs of P-DSA. The last table is the mean share of tables that single robots of three can exclude (2 values, costs of 0
-and 1).
+values, density .3, costs up to 10), which is counted on known costs, since some searches would take hours; then one
+cycle of P-DSA, P-MGM and P-Max-Sum. The last table is the mean share of tables that single robots of three can exclude
+(2 values, costs of 0 and 1).
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import time
 from random import Random
 from statistics import mean, median
@@ -21,7 +22,10 @@ from robochoc.generators.random_csp import random_csp
 from robochoc.model.problem import Team
 from robochoc.privacy import CoalitionLoss, coalition_report
 from robochoc.protocols.private.p_dsa import PDSA
+from robochoc.protocols.private.p_maxsum import PMaxSum
+from robochoc.protocols.private.p_mgm import PMGM
 from robochoc.protocols.private.pc_syncbb import PCSyncBB
+from robochoc.protocols.private.shared_search import SharedSearchProtocol
 from robochoc.run.registry import protocol_named
 from robochoc.solver.agent_problem import RunParameters
 
@@ -29,8 +33,15 @@ PROBLEMS = 20
 VALUES = 5
 ROBOTS = (5, 7, 10)
 MESSAGES = 20_000
-EXCLUDING = ("syncbb", "afb", "adopt", "dpop", "o-dpop", "mgm", "dsa", "maxsum", "pc-syncbb", "p-dsa")
-SETTINGS = {"mgm": {"cycles": "5"}, "dsa": {"cycles": "5"}, "maxsum": {"cycles": "5"}, "p-dsa": {"cycles": "2"}}
+PRIVATE = ("p-dsa", "p-mgm", "p-maxsum")
+EXCLUDING = ("syncbb", "afb", "adopt", "dpop", "o-dpop", "mgm", "dsa", "maxsum", "pc-syncbb", *PRIVATE)
+SETTINGS = {name: {"cycles": "2" if name in PRIVATE else "5"} for name in ("mgm", "dsa", "maxsum", *PRIVATE)}
+IN_CYCLES: tuple[tuple[type[SharedSearchProtocol], dict[str, str]], ...] = (
+    (PDSA, {}),
+    (PMGM, {}),
+    (PMaxSum, {"topology": "open"}),
+    (PMaxSum, {"topology": "hidden"}),
+)
 
 
 def problem(robots: int, seed: int) -> Team:
@@ -63,28 +74,35 @@ def comparisons(team: Team, seed: int) -> int:
 
 
 def print_costs(problems: int) -> None:
-    """Print the costs of PC-SyncBB and of P-DSA."""
+    """Print the costs of PC-SyncBB."""
     print("| robots | messages | bytes | CPU ms | comparisons, median of an open search |\n|" + " ---: |" * 5)
     for robots in ROBOTS:
         with Simulation(problem(robots, 0), PCSyncBB, Concurrent(seed=0)) as simulation:
             began = time.process_time()
             metrics = simulation.search(messages=MESSAGES).metrics
             spent = time.process_time() - began
-        count = metrics.messages["Result"] / (robots - 1)
+        count = metrics.messages["PublicResult"] / (robots - 1)
         numbers = (
             f"{sum(metrics.messages.values()) / count:.0f} | {metrics.bytes / count:,.0f} | {1000 * spent / count:.0f}"
         )
         searched = median(comparisons(problem(robots, seed), seed) for seed in range(problems))
         print(f"| {robots} | {numbers} | {searched:,.0f} |", flush=True)
-    print("\n| robots | messages | MB | CPU s |\n|" + " ---: |" * 4)
-    for robots in ROBOTS:
-        with Simulation(problem(robots, 0), PDSA, Concurrent(seed=0)) as simulation:
+
+
+def print_cycles() -> None:
+    """Print the costs of one cycle of the searches in cycles, with the messages before it."""
+    print("\n| robots | protocol | comparisons | messages | MB | CPU s |\n| ---: | --- |" + " ---: |" * 4)
+    for robots, (protocol, settings) in itertools.product(ROBOTS, IN_CYCLES):
+        parameters = RunParameters(0, {"cycles": "1", **settings})
+        with Simulation(problem(robots, 0), protocol, Concurrent(seed=0), parameters=parameters) as simulation:
             began = time.process_time()
             metrics = simulation.search().metrics
             spent = time.process_time() - began
-        print(
-            f"| {robots} | {sum(metrics.messages.values()):,} | {metrics.bytes / 1e6:.1f} | {spent:.0f} |", flush=True
-        )
+            robot = next(iter(simulation._hosts.values())).protocol  # noqa: SLF001 - to count comparisons
+        name = " ".join([f"`{protocol.__name__}`", *settings.values()])
+        count = robot.comparisons if isinstance(robot, SharedSearchProtocol) else 0
+        messages = sum(metrics.messages.values())
+        print(f"| {robots} | {name} | {count:,} | {messages:,} | {metrics.bytes / 1e6:.1f} | {spent:.1f} |", flush=True)
 
 
 def print_losses(problems: int) -> None:
@@ -112,6 +130,7 @@ def main() -> None:
     parser.add_argument("problems", nargs="?", type=int, default=PROBLEMS, metavar="PROBLEMS", help="how many")
     problems = parser.parse_args().problems
     print_costs(problems)
+    print_cycles()
     print_losses(problems)
 
 

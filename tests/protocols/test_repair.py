@@ -6,6 +6,8 @@ from dataclasses import replace
 from itertools import combinations
 from random import Random
 
+import pytest
+
 from robochoc.model.assembly import assemble
 from robochoc.model.expression import Type, parse
 from robochoc.model.outcome import Outcome, Verdict
@@ -98,12 +100,13 @@ def broken() -> tuple[Team, Options]:
             return team, options
 
 
-def test_a_private_search_is_not_repaired() -> None:
+@pytest.mark.parametrize("protocol", ["p-dsa", "p-maxsum", "p-mgm"])
+def test_a_private_search_is_not_repaired(protocol: str) -> None:
     rows = tuple((one, two) for one in (1, 2) for two in (1, 2))
     never = Relation("never", 2, Semantics.CONFLICTS, rows)
     pairs = [Constraint("c", never, two, two) for two in (("A", "B"), ("B", "C"))]
     team = with_costs(team_of(dict.fromkeys("ABC", (1, 2)), pairs))
-    outcome = solve(team, replace(SIMULATOR, protocol="p-dsa", settings={"cycles": "1", "bits": "31"}))
+    outcome = solve(team, replace(SIMULATOR, protocol=protocol, settings={"cycles": "1"}))
     assert outcome.verdict == Verdict.UNKNOWN
     assert outcome.repair is None
 

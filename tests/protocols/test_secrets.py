@@ -20,8 +20,14 @@ from tests.support.cases import cases
 from tests.support.program import ROOT
 
 pytestmark = pytest.mark.usefixtures("quick_encryption")
-MOST_MESSAGES = 2_000
-SETTINGS = {"pc-syncbb": ({"search": "open"}, {"search": "hidden"}), "p-dsa": ({"cycles": "1"},)}
+MOST_MESSAGES = 1_000
+QUICK = {"cycles": "1", "bits": "31"}
+SETTINGS = {
+    "p-dsa": (QUICK,),
+    "p-maxsum": ({**QUICK, "preference": "0", "topology": "open"},),
+    "p-mgm": (QUICK,),
+    "pc-syncbb": ({"search": "open", "bits": "31"}, {"search": "hidden", "bits": "31"}),
+}
 
 
 def sources(protocol: type[Protocol], team: Team, settings: dict[str, str]) -> set[str]:

@@ -42,6 +42,8 @@ MOST_TELLING = {
     "ncbb": (("odd", ScheduleName.CONCURRENT), ("patrol", ScheduleName.RANDOM)),
     "p2-dpop": (("queens3d-2", ScheduleName.CONCURRENT), ("odd", ScheduleName.RANDOM)),
     "p-dsa": (("prices", ScheduleName.CONCURRENT), ("prices", ScheduleName.RANDOM)),
+    "p-maxsum": (("prices", ScheduleName.CONCURRENT), ("prices", ScheduleName.RANDOM)),
+    "p-mgm": (("prices", ScheduleName.CONCURRENT), ("prices", ScheduleName.RANDOM)),
     "pc-syncbb": (("prices", ScheduleName.CONCURRENT), ("prices", ScheduleName.RANDOM)),
     "sfb": (("odd", ScheduleName.CONCURRENT), ("patrol", ScheduleName.RANDOM)),
 }
@@ -100,6 +102,7 @@ def journal(team: Team, protocol: str, schedule: ScheduleName) -> bytes:
     known = protocol_named(protocol).settings
     known_bits = hasattr(known, "bits")
     small = {"cycles": "1" if known_bits else "3", "samples": "3", "bits": "31"}
+    small |= {"preference": "0"} if known_bits else {}
     settings = {name: value for name, value in small.items() if hasattr(known, name)}
     options = Options(
         protocol=protocol,

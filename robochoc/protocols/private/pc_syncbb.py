@@ -22,7 +22,7 @@ Disclosed and hidden information:
 - In an open search, the answers show how the search proceeds. A coalition can exclude the costs with which it would
   proceed differently (`robochoc privacy --coalition`). Robots try their values in a random, secret order.
 - Each robot discloses the number of its declared values, which the files declare. Impossible values are tried like
-  others, at the cost of a broken constraint. Robots share costs with all robots before them, also if these are 0: so
+  others, at the cost of broken constraints. Robots share costs with all robots before them, also if these are 0: so
   who shares a constraint with whom is not disclosed.
 - A refusal depends on private costs: they are too large for the field, or an open search needs too many comparisons.
 - A team of two robots has no minority: nothing is hidden in it.

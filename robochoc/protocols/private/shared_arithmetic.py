@@ -33,7 +33,9 @@ _MOST_WAITING = 4
 _TWO_ROBOTS = 2
 _DRAWN_AT_ONCE = 512
 _MOST_PREPARED = 8
-"""The largest number of comparisons for which random numbers are prepared at once."""
+"""The largest number of batches of comparisons for which random numbers are prepared at once."""
+_MOST_COMPARED = 64
+"""The largest number of comparisons in a batch, and prepared at once: it bounds messages and memory."""
 
 
 class SharesMessage(Message, frozen=True):
@@ -132,6 +134,7 @@ class SharedArithmeticProtocol(Protocol):
         degree: The degree t of all polynomials: the largest number of robots that together learn nothing.
         results: The results of the last `reduce`, `compare` or `open`, for the method that continues.
         comparisons: The number of comparisons so far.
+        steps: The methods that continue after a step, by the name of the step.
     """
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
@@ -151,11 +154,11 @@ class SharedArithmeticProtocol(Protocol):
         self._dealt: list[list[int]] = []
         self._reductions: list[Reduction] = []
         self._numbers: list[int] = []
+        self._answers: list[int] = []
         self._comparison: Comparison | None = None
         self._published: list[int] = []
         self._kind: type[SharesMessage] = PublicResult
-        self._then: dict[str, str] = {}
-        """The methods that continue after a step, by the name of the step."""
+        self.steps: dict[str, str] = {}
 
     @property
     @abstractmethod
@@ -206,6 +209,10 @@ class SharedArithmeticProtocol(Protocol):
         """Share `secrets` with all robots, and return this robot's shares."""
         return self.deal(Inputs, self.field.share(secrets, self.degree, len(self.order.names), self.secret))
 
+    def go_to(self, step: str) -> None:
+        """Continue with the method after `step`."""
+        getattr(self, self.steps[step])()
+
     # Opening
 
     def open(self, shares: Sequence[int], then: str) -> None:
@@ -214,7 +221,7 @@ class SharedArithmeticProtocol(Protocol):
 
     def _open(self, kind: type[SharesMessage], shares: Sequence[int], then: str) -> None:
         """Send the shares to the first robot, which combines them and sends the values to all in a message `kind`."""
-        self._then["open"] = then
+        self.steps["open"] = then
         self._published = [*shares]
         if self.rank == 0:
             self._kind = kind
@@ -229,11 +236,11 @@ class SharedArithmeticProtocol(Protocol):
         content = self._kind(self.field.pack(self.results))
         for name in self.others:
             self.send(name, content)
-        getattr(self, self._then["open"])()
+        self.go_to("open")
 
     def _use_opened(self) -> None:
         (self.results,) = self.received_shares(len(self._published))
-        getattr(self, self._then["open"])()
+        self.go_to("open")
 
     # Products
 
@@ -259,15 +266,19 @@ class SharedArithmeticProtocol(Protocol):
 
     def compare(self, numbers: Sequence[int], then: str) -> None:
         """For each shared x, compute shares of 1 if x < p/2 (not negative), otherwise of 0. Continue with `then`."""
-        self._then["compare"] = then
-        self._numbers = [*numbers]
+        self.steps["compare"] = then
+        self._numbers, self._answers = [*numbers], []
         self.comparisons += len(numbers)
-        bits = self.field.bits
-        products = products_per_comparison(bits)
-        self._prepare(len(numbers) * bits, len(numbers) * products, "_compare")
+        self._compare_next()
+
+    def _compare_next(self) -> None:
+        """Start the next batch of comparisons."""
+        bits, count = self.field.bits, min(len(self._numbers), _MOST_COMPARED)
+        self._prepare(count * bits, count * products_per_comparison(bits), "_compare")
 
     def _compare(self) -> None:
-        bits, numbers = self.field.bits, self._numbers
+        bits, numbers = self.field.bits, self._numbers[:_MOST_COMPARED]
+        self._numbers = self._numbers[_MOST_COMPARED:]
         count = bits * len(numbers)
         taken, self._random_bits = self._random_bits[-count:], self._random_bits[:-count]
         grouped = [taken[at : at + bits] for at in range(0, count, bits)]
@@ -285,8 +296,13 @@ class SharedArithmeticProtocol(Protocol):
         if comparison.products:
             self.reduce(comparison.products, "_advance_comparison")
             return
-        self.results, self._comparison = comparison.results, None
-        getattr(self, self._then["compare"])()
+        self._answers += comparison.results
+        self._comparison = None
+        if self._numbers:
+            self._compare_next()
+            return
+        self.results, self._answers = self._answers, []
+        self.go_to("compare")
 
     def _running_comparison(self) -> Comparison:
         if self._comparison is None:
@@ -300,10 +316,12 @@ class SharedArithmeticProtocol(Protocol):
         if len(self._random_bits) >= bits and len(self._doubles) >= doubles:
             getattr(self, then)()
             return
-        self._then["prepare"] = then
-        self._prepared = min(2 * self._prepared, _MOST_PREPARED) or 1
-        spare = self._prepared * (products_per_comparison(self.field.bits) + 1)
-        self._wanted = (self._prepared * bits, max(doubles, spare))
+        self.steps["prepare"] = then
+        limit = min(_MOST_PREPARED, _MOST_COMPARED * self.field.bits // max(bits, 1)) or 1
+        self._prepared = min(2 * self._prepared or 1, limit)
+        lacking = bits if len(self._random_bits) < bits else 0
+        spare = max(doubles, products_per_comparison(self.field.bits) + 1)
+        self._wanted = (self._prepared * lacking, self._prepared * spare)
         self._dealt = [self._deal_randomness()] if self.rank <= self.degree else []
         dealers = self.order.names[: self.degree + 1]
         self.wait_for(Randomness, [name for name in dealers if name != self.problem.agent], "_add_randomness")
@@ -341,7 +359,7 @@ class SharedArithmeticProtocol(Protocol):
             self._mask()
             return
         self._random_bits += self._dealt[0]
-        getattr(self, self._then["prepare"])()
+        self.go_to("prepare")
 
     def _use_combined_bits(self) -> None:
         columns = zip(*self._dealt[:2], self.results, strict=True)

@@ -1,7 +1,8 @@
 """The costs of a robot, for protocols that compute with them on shares.
 
 Robots first send the numbers of their declared values (`Sizes`). Each robot computes the cost of each of its declared
-values, alone and with the values of the robots before it: impossible values cost as much as a broken constraint.
+values, alone and with the values of the robots before it: an impossible value costs as much as a broken constraint, or
+more.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ def check_settings(comparisons: int, bits: int) -> None:
 
 
 class Sizes(Message, frozen=True):
-    """The number of the sender's declared values, and its constraints with two or more robots before it: their names.
+    """The number of the sender's declared values, and the names of the robots before it in announced constraints.
 
     All robots need the latter to compute with the codes of these robots' values together.
     """
@@ -89,9 +90,24 @@ class SharedCostsProtocol(SharedArithmeticProtocol):
         return field_of(self.limits[1])
 
     @property
+    def unit(self) -> int:
+        """The factor of all finite costs. A protocol may add less than one unit to the cost of each value."""
+        return 1
+
+    @property
     def broken(self) -> int:
         """The cost of a broken hard constraint, above all sums of finite costs."""
-        return 1 << 2 * self.field.bits // 3
+        return 1 << 3 * self.field.bits // 5
+
+    @property
+    def excluded(self) -> int:
+        """The cost of an impossible value."""
+        return self.broken
+
+    @property
+    def announced_scopes(self) -> Sequence[tuple[str, ...]]:
+        """The constraints with robots before this one that all robots need to know."""
+        return [*self.wide_rows]
 
     def start(self) -> None:
         """Send the number of values; a robot alone decides."""
@@ -105,7 +121,7 @@ class SharedCostsProtocol(SharedArithmeticProtocol):
         if size > MOST_VALUES:
             raise TooLargeError(f"{self.problem.agent} has {size:,} values, more than {MOST_VALUES:,}")
         for name in self.others:
-            self.send(name, Sizes(size, [*self.wide_rows]))
+            self.send(name, Sizes(size, [*self.announced_scopes]))
         self.wait_for(Sizes, self.others, "_use_sizes")
         self.proceed()
 
@@ -126,10 +142,8 @@ class SharedCostsProtocol(SharedArithmeticProtocol):
 
     def _compute_costs(self) -> None:
         problem, size = self.problem, self.problem.declared_count(self.problem.agent)
-        alone = own_costs(problem)
-        self.alone = [
-            self._number(alone[self.places[one]]) if one in self.places else self.broken for one in range(size)
-        ]
+        alone, excluded = own_costs(problem), self.excluded
+        self.alone = [self._number(alone[self.places[one]]) if one in self.places else excluded for one in range(size)]
         ranks = self.order.rank
         above = [name for name in problem.neighbours if ranks[name] < self.rank]
         for table in problem.tables({name: problem.declared(name) for name in above}):
@@ -137,7 +151,8 @@ class SharedCostsProtocol(SharedArithmeticProtocol):
                 continue
             agents = sorted(table.agents, key=ranks.__getitem__)
             axes = [*map(table.agents.index, agents), len(agents)]
-            costs = table.joined().transpose(axes).reshape(-1, len(problem.values))
+            joined = table.joined().transpose(axes)
+            costs = joined.reshape(math.prod(joined.shape[:-1]), -1)
             rows = self.rows if len(agents) == 1 else self.wide_rows
             known = rows.setdefault(tuple(agents), [[0] * len(costs) for _ in range(size)])
             for place, index in self.places.items():
@@ -145,26 +160,32 @@ class SharedCostsProtocol(SharedArithmeticProtocol):
                 known[place] = [one + two for one, two in zip(known[place], column, strict=True)]
 
     def _number(self, cost: float) -> int:
-        return self.broken if cost == INFINITE else int(cost)
+        return self.broken if cost == INFINITE else int(cost) * self.unit
 
     def _check_sums(self) -> None:
-        """Raise `TooLargeError` if costs may add up to as much as a broken constraint, or these to half the field."""
+        """Raise `TooLargeError` if costs may add up to as much as a broken constraint, or these to p/16.
+
+        A robot knows its constraints with robots before it. If each robot's add up to p/16 divided by the number of
+        robots, all together do not exceed p/16.
+        """
         scopes = self.problem.scopes(self.order.names)
         dearest = max((cost for cost in self.problem.charges if cost < INFINITE), default=0)
         robots = len(self.order.names)
-        if (dearest + sum(most for _, most in scopes)) * robots >= self.broken:
+        added = int(self.unit > 1)
+        if (dearest + sum(most for _, most in scopes) + added) * self.unit * robots >= self.broken:
+            without = ", or no preferences (--set preference=0)" if added else ""
             raise TooLargeError(
-                f"costs may add up to {self.broken:,}, too much for a field of {self.field.bits} bits: use smaller"
-                " costs, or a larger field (--set bits=N)"
+                f"costs may add up to {self.broken // self.unit:,}, too much for a field of {self.field.bits} bits: use"
+                f" smaller costs, or a larger field (--set bits=N){without}"
             )
-        if (len(scopes) + 2) * robots * self.broken >= self.field.prime // 8:
+        if (len(scopes) + 2) * robots * self.broken >= self.field.prime // 16:
             raise TooLargeError(
                 f"too many constraints for a field of {self.field.bits} bits: use a larger field (--set bits=N)"
             )
 
     def _use_sizes(self) -> None:
         received = [message for message in self.received() if isinstance(message, Sizes)]
-        received.insert(self.rank, Sizes(self.problem.declared_count(self.problem.agent), [*self.wide_rows]))
+        received.insert(self.rank, Sizes(self.problem.declared_count(self.problem.agent), [*self.announced_scopes]))
         self.sizes = [message.values for message in received]
         if not all(0 < size <= MOST_VALUES for size in self.sizes):
             raise ValueError("received an invalid number of values")
@@ -178,8 +199,8 @@ class SharedCostsProtocol(SharedArithmeticProtocol):
         """Return the ranks of the robots in announced scopes. Raises `ValueError` for impossible scopes."""
         found = [[self.order.rank.get(name, rank) for name in names] for names in scopes]
         for ranks in found:
-            if len(ranks) < 2 or ranks != sorted({*ranks}) or ranks[-1] >= rank:  # noqa: PLR2004 - several robots
-                raise ValueError("received the names of a constraint that is not shared with several robots before")
+            if not ranks or ranks != sorted({*ranks}) or ranks[-1] >= rank:
+                raise ValueError("received the names of a constraint that is not shared with robots before the sender")
             if math.prod(self.sizes[one] for one in ranks) > MOST_VALUES:
                 raise TooLargeError(f"the robots of a constraint have more than {MOST_VALUES:,} combinations of values")
         return found

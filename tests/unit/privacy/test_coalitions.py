@@ -11,8 +11,11 @@ from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.privacy import PrivacyError, coalition_report
 from robochoc.privacy.coalitions import CoalitionReport
 from robochoc.protocols.private.p_dsa import PDSA, PDSASettings
+from robochoc.protocols.private.p_maxsum import PMaxSum, PMaxSumSettings
+from robochoc.protocols.private.p_mgm import PMGM
 from robochoc.protocols.private.pc_syncbb import PCSyncBB, PCSyncBBSettings, Search
 from robochoc.protocols.private.shamir import Field, field_of
+from robochoc.protocols.private.shared_search import SearchSettings, SharedSearchProtocol
 from robochoc.protocols.protocol import Protocol
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.agent_problem import RunParameters
@@ -42,19 +45,35 @@ class LargeField(HiddenSearch):
         return field_of(31)
 
 
-class SmallField(PDSA):
-    """A private local search in a small field."""
-
-    settings = PDSASettings(probability=1, cycles=2)
+class SmallField(SharedSearchProtocol):
+    """A private search in cycles in a small field."""
 
     @property
     def field(self) -> Field:
         return field_of(19)
 
 
+class SmallPDSA(SmallField, PDSA):
+    """P-DSA in a small field."""
+
+    settings = PDSASettings(probability=1, cycles=2)
+
+
+class SmallPMGM(SmallField, PMGM):
+    """P-MGM in a small field."""
+
+    settings = SearchSettings(cycles=2)
+
+
+class SmallPMaxSum(SmallField, PMaxSum):
+    """P-Max-Sum in a small field, without preferences."""
+
+    settings = PMaxSumSettings(cycles=1, preference=0)
+
+
 def measured(team: Team, protocol: str | type[Protocol], size: int = 1, *, coins: int = 1) -> CoalitionReport:
     offered = protocol_named(protocol) if isinstance(protocol, str) else protocol
-    settings = {"cycles": "3"} if hasattr(offered.settings, "cycles") else {}
+    settings = {"cycles": "3"} if hasattr(offered.settings, "cycles") and not offered.traits.secret_keys else {}
     return coalition_report(team, offered, size, parameters=RunParameters(0, settings), coins=coins, costs=(0, 1))
 
 
@@ -129,10 +148,11 @@ def test_a_hidden_search_discloses_nothing_to_minorities(seeds: range) -> None:
         assert [one.excluded_by_messages for one in report.losses] == [0] * len(report.losses)
 
 
+@pytest.mark.parametrize("protocol", [SmallPDSA, SmallPMGM, SmallPMaxSum])
 @count("number", fast=1, slow=20)
-def test_a_private_local_search_discloses_nothing_to_minorities(number: int) -> None:
+def test_a_private_search_in_cycles_discloses_nothing_to_minorities(number: int, protocol: type[SmallField]) -> None:
     for seed in range(number):
-        report = measured(random_costs(drawn(f"local {seed}")), SmallField)
+        report = measured(random_costs(drawn(f"local {seed}")), protocol)
         assert [one.excluded_by_messages for one in report.losses] == [0] * len(report.losses)
 
 
