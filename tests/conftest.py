@@ -111,13 +111,18 @@ def no_protocol_left_registered() -> Iterator[None]:
 def quick_encryption(monkeypatch: pytest.MonkeyPatch) -> None:
     """Protocols encrypt in a group of small elements, in which no secret is safe, or share in the smallest field."""
     from robochoc.protocols.private.p_dsa import PDSA, PDSASettings
+    from robochoc.protocols.private.p_maxsum import PMaxSum, PMaxSumSettings
+    from robochoc.protocols.private.p_mgm import PMGM
     from robochoc.protocols.private.pc_syncbb import PCSyncBB, PCSyncBBSettings
     from robochoc.protocols.private.rerooting import RerootingProtocol
+    from robochoc.protocols.private.shared_search import SearchSettings
     from tests.support.toy_group import ToyGroup
 
     monkeypatch.setattr(RerootingProtocol, "group", ToyGroup)
     monkeypatch.setattr(PCSyncBB, "settings", PCSyncBBSettings(bits=31))
     monkeypatch.setattr(PDSA, "settings", PDSASettings(cycles=4, bits=31))
+    monkeypatch.setattr(PMGM, "settings", SearchSettings(cycles=4, bits=31))
+    monkeypatch.setattr(PMaxSum, "settings", PMaxSumSettings(cycles=2, bits=31))
 
 
 @pytest.fixture

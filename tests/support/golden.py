@@ -102,7 +102,6 @@ def journal(team: Team, protocol: str, schedule: ScheduleName) -> bytes:
     known = protocol_named(protocol).settings
     known_bits = hasattr(known, "bits")
     small = {"cycles": "1" if known_bits else "3", "samples": "3", "bits": "31"}
-    small |= {"preference": "0"} if known_bits else {}
     settings = {name: value for name, value in small.items() if hasattr(known, name)}
     options = Options(
         protocol=protocol,

@@ -43,8 +43,8 @@ Choices, and differences from `maxsum`:
   all entries: those of R differ by no more than the entries of their function.
 - A broken hard constraint costs more than all finite costs, instead of `inf`; an impossible value more than all broken
   constraints of its robot.
-- Preferences are drawn like keys. All costs are multiplied by 2^16, so that a preference is an integer; `preference=0`
-  omits this, for smaller fields. Of several best values the first declared one is taken.
+- Preferences are drawn like keys. All costs are multiplied by 2^(bits/4), so that a preference is an integer;
+  `preference=0` omits this, for high costs. Of several best values the first declared one is taken.
 - Constraints are over at most two robots.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
@@ -68,8 +68,6 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.private.shared_search import PRIVACY, Candidate, SearchSettings, SharedSearchProtocol
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.local_problem import LocalProblem
-
-_SCALE = 1 << 16
 
 
 class PMaxSumSettings(SearchSettings, frozen=True):
@@ -124,7 +122,7 @@ class PMaxSum(SharedSearchProtocol):
 
     @property
     def unit(self) -> int:
-        return _SCALE if self.settings.preference else 1
+        return 1 << self.field.bits // 4 if self.settings.preference else 1
 
     @property
     def announced_scopes(self) -> Sequence[tuple[str, ...]]:
