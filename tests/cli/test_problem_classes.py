@@ -10,21 +10,24 @@ from pathlib import Path
 import pytest
 
 from robochoc.formats import write_team
+from robochoc.generators.random_csp import random_csp
 from robochoc.model.assembly import assemble
 from robochoc.model.constraint import Domain, Variable
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.expression.fixed_point import VALUE_PLACES
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.model.real import RealInterval, grid
+from robochoc.run import Options, solve
 from tests.support.cases import cases
 from tests.support.program import ROOT, robochoc_within
 from tests.support.real_teams import PLACES, best_cost, real_constraint
 
 PAGE = ROOT / "docs" / "reference" / "known-limits.md"
 EXAMPLES = ROOT / "docs" / "examples"
-CLASSES = ("random variables", "real variables", "several objectives")
-NAMED = dict(zip(CLASSES, ("random variables", "real", "objectives"), strict=True))
-"""Words in each refusal, which name the problem class."""
+CLASSES = ("random variables", "real variables", "several objectives", "`pc-syncbb`", "`p-dsa`")
+"""Problem classes, and protocols that hide secrets from coalitions, which solve a small problem with costs."""
+NAMED = dict(zip(CLASSES, ("random variables", "real", "objectives", "pc-syncbb", "p-dsa"), strict=True))
+"""Words in each refusal, which name the problem class or the protocol."""
 OPTIONS = {
     "`solve --runtime simulator`": "--runtime simulator --journal run.journal",
     "`solve --runtime processes`": "--runtime processes",
@@ -41,15 +44,18 @@ OPTIONS = {
     "`solve --html`": "--runtime simulator --html page.html",
     "`solve --situation flight`": "--runtime simulator --situation flight",
 }
+OK, USAGE, UNKNOWN = 0, 2, 3
+STATUSES = {"supported": OK, "refused": USAGE, "unknown": UNKNOWN}
+"""The exit statuses of the words in the table."""
 EXPORTS = ("xcsp3", "cfn", "pydcop", "frodo", "graphml")
 COMMANDS = {
     "`validate`": "validate team",
     **{command: f"solve team --json {options}" for command, options in OPTIONS.items()},
     "`replay`, `privacy`, `journal show`, `journal export`, `animate`": "replay run.journal;privacy run.journal;"
     "journal show run.journal;journal export run.journal --format words;animate run.journal --html scene.html",
-    "`check`": "check mgm team --set cycles=1 --states 300",
+    "`check`": "check {protocol} team --states 100",
     "`compile`": "compile team",
-    "`compare`": "compare team --protocols auto --jobs 1",
+    "`compare`": "compare team --protocols {protocol} --jobs 1",
     "`experiment run`": "experiment run study.toml --jobs 1",
     "`capacity`": "capacity team team --runtime simulator --deadline 600 --timeout 600",
     "`play`": "play team --rounds 2 --json",
@@ -72,7 +78,7 @@ def table() -> dict[str, dict[str, str]]:
 
 def real_team() -> Team:
     """Return a team of two robots with real variables."""
-    names = ("x", "y")
+    names = ("x1", "x2")
     domain = Domain("D", grid(0, 10, 3), real=RealInterval(0, 10, PLACES))
     owned = {f"R{name}": [Variable(name, domain)] for name in names}
     constraints = [real_constraint("s", "sqr(X - 0.3)", names[:1]), real_constraint("p", "abs(X - Y + 0.2)", names)]
@@ -88,9 +94,25 @@ def write_example(problem_class: str) -> Decimal:
         found = best_cost(team)
         assert found is not None
         return found
+    if problem_class in CLASSES[3:]:
+        team = random_csp(3, 2, 1, 0, max_cost=5, seed=1)
+        write_team(team, Path("team"))
+        return Decimal(solve(team, Options(protocol="central")).cost or 0)
     name, cost = {"random variables": ("gusts", "7.5"), "several objectives": ("survey", "11")}[problem_class]
     shutil.copytree(EXAMPLES / name, "team")
     return Decimal(cost)
+
+
+def completed(line: str, problem_class: str) -> str:
+    """Return a command line of the table with the protocol of the problem class."""
+    own = NAMED[problem_class] if problem_class in CLASSES[3:] else ""
+    command, _ = line.split(maxsplit=1)
+    protocol = own or {"check": "mgm", "compare": "auto"}.get(command, "")
+    if own and command in {"solve", "capacity"}:
+        line += f" --protocol {own}"
+    if own == "p-dsa" and command in {"solve", "compare"}:
+        line += " --set cycles=3"
+    return line.format(protocol=protocol) + " --set cycles=1" * (command == "check" and protocol in {"mgm", "p-dsa"})
 
 
 def check_supported(line: str, output: str, least: Decimal) -> None:
@@ -101,7 +123,7 @@ def check_supported(line: str, output: str, least: Decimal) -> None:
         assert line.startswith("solve changing") or result["cost"] >= least
         if result["verdict"] == "optimal" and "changing" not in line:
             assert result["cost"] == least
-        assert "dpop" not in line or result["verdict"] == "optimal"
+        assert not any(name in line for name in ("dpop", "pc-syncbb")) or result["verdict"] == "optimal"
     if line.startswith("export") and "graphml" not in line:
         kind = line.rpartition(".")[2]
         read = robochoc_within("import", f"team.{kind}", "--format", kind, "-o", f"from-{kind}")
@@ -113,7 +135,7 @@ def check_supported(line: str, output: str, least: Decimal) -> None:
 def test_the_table_has_all_commands_and_classes() -> None:
     assert list(table()) == list(COMMANDS)
     assert all(tuple(cells) == CLASSES for cells in table().values())
-    assert {cell for cells in table().values() for cell in cells.values()} == {"supported", "refused"}
+    assert {cell for cells in table().values() for cell in cells.values()} == {*STATUSES, "-"}
 
 
 @pytest.mark.more
@@ -121,16 +143,20 @@ def test_the_table_has_all_commands_and_classes() -> None:
 @pytest.mark.parametrize("problem_class", CLASSES)
 def test_each_command_supports_the_problem_class_or_refuses_it(problem_class: str) -> None:
     least = write_example(problem_class)
-    Path("study.toml").write_text('record = ["cost-over-time"]\n[problems]\npath = "team"\n[runs]\nprotocol = "auto"\n')
+    runs = f'protocol = "{NAMED[problem_class] if problem_class in CLASSES[3:] else "auto"}"'
+    runs += "\nsettings = { cycles = 3 }" * ("p-dsa" in runs)
+    Path("study.toml").write_text(f'record = ["cost-over-time"]\n[problems]\npath = "team"\n[runs]\n{runs}\n')
     with cases() as each:
         for command, cells in table().items():
-            for line in COMMANDS[command].split(";"):
+            lines = COMMANDS[command].split(";") if cells[problem_class] != "-" else ()
+            for line in [completed(line, problem_class) for line in lines]:
                 with each(line):
                     done = robochoc_within(*line.split())
-                    is_refused = cells[problem_class] == "refused"
-                    assert done.returncode == (2 if is_refused else 0), done.stderr
-                    if is_refused:
-                        assert not done.stdout
+                    expected = STATUSES[cells[problem_class]]
+                    is_cut = line.startswith("check") and done.returncode == UNKNOWN  # at --states
+                    assert is_cut or done.returncode == expected, done.stderr
+                    if expected != OK:
+                        assert expected == UNKNOWN or not done.stdout
                         assert len(done.stderr.strip().splitlines()) == 1
                         assert NAMED[problem_class] in done.stderr
                     else:

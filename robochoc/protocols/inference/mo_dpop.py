@@ -10,8 +10,9 @@ From the root down, each robot then chooses a value for each point of the front.
   there is no solution. The team adopts the first point, which is minimal in the first objective, then in the second.
 - **Parameters (`--set`)**: `vectors`, the maximum number of vectors in a robot's table (default 100,000): a run that
   needs more ends; `bases`, the number system of packed vectors, set by the run.
-- **Reference**: the principle is that of Rollón: "Multi-objective optimization in graphical models", PhD thesis,
-  2008 (bucket elimination on vectors), and of Matsui, Silaghi, Hirayama, Yokoo, Matsuo: "Distributed search method with
+- **Reference**: the principle is that of Rollón and Larrosa: "Bucket elimination for multiobjective optimization
+  problems", Journal of Heuristics 12, 2006, of Rollón: "Multi-objective optimization in graphical models", PhD thesis,
+  2008, and of Matsui, Silaghi, Hirayama, Yokoo, Matsuo: "Distributed search method with
   bounded cost vectors on multiple objective DCOPs", PRIMA 2012. Only their abstracts were found: this is built from the
   principle.
 
