@@ -177,13 +177,16 @@ def _certified(instance: Instance, _: Callable[[int], None]) -> Certificate:
 
 
 def main(path: Path) -> None:
-    """Compute all certificates, in parallel, and write the list to `path`."""
-
-    def show(done: int, _: int) -> None:
-        sys.stderr.write(f"\r{done} instances")
-
+    """Compute all certificates, in parallel, and write the list to `path`. A terminal shows the progress."""
+    show = _show if sys.stderr.isatty() else None
     with ParallelMap(_certified, usable_processors(), show) as computed:
         write_atomically(path, list_content(one for _, one in computed.results(instances())))
+    if show:
+        sys.stderr.write("\n")
+
+
+def _show(done: int, _: int) -> None:
+    sys.stderr.write(f"\r{done} instances")
 
 
 if __name__ == "__main__":

@@ -93,6 +93,7 @@ class ParallelMap(Generic[Item, Result]):
 
         result = self._function(item, report)
         self._finished += 1
+        self._shown()
         return result
 
     def _ready(self) -> Iterator[tuple[Item, Result]]:

@@ -26,7 +26,7 @@ def test_results_are_in_the_order_of_the_items(jobs: int) -> None:
     with ParallelMap(square, jobs, lambda done, progress: shown.append((done, progress))) as processes:
         assert [*processes.results(range(8))] == [(number, number**2) for number in range(8)]
     assert shown == sorted(shown)
-    assert shown[-1][1] == sum(range(8))
+    assert shown[-1] == (8, sum(range(8)))
 
 
 @pytest.mark.parametrize("jobs", [1, 3])
