@@ -88,15 +88,18 @@ compiled: $(COMPILED)/.ready  ## robochoc with compiled modules: .venv/compiled/
 
 # The tests stand in a folder without the sources, so that what is imported is what the wheel has installed.
 APART := out/compiled/tests
-ON_BOTH ?= tests/conformance tests/protocols tests/unit/solver tests/unit/communication tests/unit/replay \
-	tests/cli/test_local_signals.py
-ON_PURE ?= tests/unit/communication/test_simulator.py tests/protocols/test_abt.py tests/unit/system
-PYTEST_APART = cd $(APART) && $(abspath $(COMPILED))/bin/python -m pytest -n $(JOBS) --dist worksteal
+# Of some folders the files that name a compiled module: solvers and links are the same from any wheel.
+ABOUT_COMPILED ?= tests/protocols tests/unit/solver tests/unit/communication tests/unit/replay
+CORE := tests/unit/system/test_compiled_core.py
+ON_BOTH ?= tests/conformance tests/cli/test_local_signals.py $(CORE)
+ON_PURE ?= tests/unit/communication/test_simulator.py tests/protocols/test_abt.py $(CORE)
+PYTHON_APART = $(abspath $(COMPILED))/bin/python
+PYTEST_APART = $(PYTHON_APART) -m pytest -n $(JOBS) --dist worksteal
 test-compiled: compiled  ## the same answers from compiled modules, and from the same wheel with ROBOCHOC_PURE=1
 	@rm -rf $(APART) && mkdir -p $(APART)
 	@cp -r benchmarks docs instances requirements tests xsd *.md *.toml *.yml Makefile $(APART)
-	$(PYTEST_APART) $(ON_BOTH) tests/unit/system
-	export ROBOCHOC_PURE=1; $(PYTEST_APART) $(ON_PURE)
+	cd $(APART) && files=$$($(PYTHON_APART) -m tests.support.compiled $(ABOUT_COMPILED)) && $(PYTEST_APART) $(ON_BOTH) $$files
+	cd $(APART) && ROBOCHOC_PURE=1 $(PYTEST_APART) $(ON_PURE)
 	@rm -rf $(APART)
 
 # TESTS="tests/protocols" measures what some of the tests reach. Left out: signals that meet Python's own start, which is
