@@ -124,7 +124,9 @@ $(DOCS): $(READY) requirements/docs.txt
 # --strict: a broken link, anchor or reference ends the build.
 # The theme says when its maintenance ends: docs/explanation/design/dependencies.md.
 docs: $(DOCS)  ## the documentation site: out/site/index.html, readable without a network
+	@mkdir -p out && rm -f out/site.built && touch out/site.begun
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+	@mv out/site.begun out/site.built
 
 # One of several versions, with a selector: a commit of the branch gh-pages, which the workflow `release` pushes.
 DOCS_VERSION ?= $(basename $(VERSION)) latest

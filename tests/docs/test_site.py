@@ -29,8 +29,22 @@ pytestmark = [
 ]
 
 
+BUILT = ROOT / "out" / "site.built"
+"""Left by `make docs` when it has built `out/site`; its time is that of the start."""
+
+
+def newest_source() -> float:
+    """Return the time of the last change of a file that the site is built from."""
+    files = (path for folder in ("benchmarks", "docs", "robochoc") for path in (ROOT / folder).rglob("*.*"))
+    sources = (path for path in (*files, *ROOT.glob("*.md"), ROOT / "mkdocs.yml") if path.suffix != ".pyc")
+    return max(path.stat().st_mtime for path in sources if path.is_file())
+
+
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of the site. What `make docs` has built is not built again."""
+    if BUILT.is_file() and newest_source() < BUILT.stat().st_mtime:
+        return ROOT / "out" / "site"
     folder = tmp_path_factory.mktemp("site")
     # Not --quiet: warnings that are not shown are not counted by --strict.
     words = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)]
