@@ -44,11 +44,6 @@ def _must_or_cost(rule: SketchRule) -> str:
     return say("rule-words.must") if rule.cost is None else say("rule-words.cost", cost=rule.cost)
 
 
-def robot_words(sketch: Sketch, rule: SketchRule) -> str:
-    """Return the robots in a rule in words: their names, or all robots."""
-    return _everybody(sketch, rule, [*sketch.bound(rule)])
-
-
 def value_words(sketch: Sketch, decision: Decision, value: int | str) -> str:
     """Return a value in words. A cell of the map becomes column and row, from 1; other values are unchanged."""
     if decision.kind == DecisionKind.PLACE and isinstance(value, int):

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import robochoc.app
 from robochoc.app.sketch.rules import PALETTE
-from robochoc.app.sketch.sentences import listed, robot_words, sentence, short, value_words, weight_of
+from robochoc.app.sketch.sentences import listed, sentence, short, value_words, weight_of
 from robochoc.app.sketch.sketch import Area, Cell, Decision, DecisionKind, Sketch, SketchRobot, SketchRule
 from robochoc.app.texts import catalogue, say
 from tests.support.cases import looped
@@ -48,7 +48,6 @@ def test_a_sentence_names_the_robots_and_what_was_filled_in() -> None:
 def test_a_rule_for_everybody_says_so() -> None:
     rule = SketchRule("R1", "different", "level")
     assert sentence(TEAM, rule) == "In level, all robots choose different values."
-    assert robot_words(TEAM, rule) == "all robots"
 
 
 def test_a_leader_and_an_order_are_told() -> None:
