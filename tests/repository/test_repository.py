@@ -4,23 +4,14 @@ from __future__ import annotations
 
 import ast
 import re
-import subprocess
-import sys
 import tomllib
 from collections.abc import Collection, Iterator
-from pathlib import Path
 
 from tests.support.program import ROOT
 
 SOURCES = sorted((ROOT / "robochoc").rglob("*.py"))
 SHARED = ("support", "fuzz", "mutation", "simulation")
 """Packages of `tests` that others import."""
-
-
-def test_imports_run_downward() -> None:
-    linter = Path(sys.executable).parent / "lint-imports"
-    done = subprocess.run([linter], cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout
 
 
 def test_no_test_imports_another() -> None:
