@@ -26,6 +26,7 @@ from robochoc.model.expression import Apply, Name
 from robochoc.model.finer_units import robot_in_places
 from robochoc.model.priorities import priority_order
 from robochoc.model.problem import Child, Parent, ProblemKind, RandomVariable, Robot, Team, Topic
+from robochoc.model.real import RealParameters
 from robochoc.model.symbols import with_marked_symbols, with_table_everywhere
 from robochoc.model.uncertainty import Outcomes, expected_robot
 from robochoc.system.lazy_dataclass import dataclass
@@ -137,8 +138,10 @@ def _without_constants(
             continue
         price = constraint.price({})
         if price == INFINITE:
-            first = next(own[0].name for own in variables.values() if own)
-            found.append(Constraint(constraint.name, _NEVER, (first,), (first,)))
+            first = next(own[0] for own in variables.values() if own)
+            real = first.domain.real
+            never = replace(_NEVER, real=RealParameters(_NEVER.parameters, real.places)) if real else _NEVER
+            found.append(Constraint(constraint.name, never, (first.name,), (first.name,)))
         elif price:
             places = constraint.definition.places if isinstance(constraint.definition, Function) else costs.places
             unit = 10 ** (costs.places - places)

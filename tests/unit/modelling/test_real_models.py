@@ -84,6 +84,14 @@ def test_private_parts_and_integers() -> None:
     assert (solution["A.x"], solution["B.n"], solution.cost) == (3.75, 0, Decimal("7.390625"))
 
 
+def test_a_condition_that_never_holds_excludes_all_real_numbers() -> None:
+    model = robochoc.Model("never")
+    x = model.robot("A").real("x", 0, 1)
+    model.add(x - x >= 0.5)
+    model.minimize(x)
+    assert model.solve("dpop").verdict == Verdict.NO_SOLUTION
+
+
 @looped(("wrong", "message"), [
     (lambda m: m.robots["A"].real("y", 1, 1), "the interval from 1 to 1 is empty"),
     (lambda m: m.robots["A"].real("y", 0, 0.0005), "0.0005 is not a number of at most 18 digits with the precision"),
