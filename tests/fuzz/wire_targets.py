@@ -103,7 +103,7 @@ def frames(receiver: str) -> Sequence[bytes]:
     said: list[words.ControlMessage] = [
         *(words.Register(profile_of(one), "incarnation") for one in _robots()),
         words.Joined("incarnation", b""),
-        words.DomainAnswer({"V": ((1, 3), (5, 7))}),
+        words.DomainAnswer({"V": ((1, 3), (5, 7))}, ("V",), {"V": 3}),
         Ready(epoch),
         Counters(epoch, 1, 7, 7),
         Conclusion(epoch, Verdict.NO_SOLUTION),

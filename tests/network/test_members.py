@@ -234,6 +234,18 @@ def test_what_a_childs_constraints_look_at_is_asked_for_whether_its_parent_says_
     assert members.tasks(1, "abt", Traits(), DEFAULT_PARAMETERS)["B"].interfaces == {"A": ("X",), "B": ("Y",)}
 
 
+def test_real_numbers_that_are_disclosed_later_have_decimals() -> None:
+    members = NetworkMembers()
+    members.register("A", robot("A", children=("B",)), "first")
+    members.register("B", robot("B", parents=("A",), shown="Y", wants=("X",)), "first")
+    assert members.show("A", {"X": ((100, 100), (300, 300))}, real_places={"X": 9}).startswith("real numbers have 0 to")
+    assert members.show("A", {"X": ((1, 3),)}, symbolic=["X"]) == "a value of X is not the code of a symbol"
+    assert members.show("A", {"X": ((1, 3),)}, real_places={"Z": 1}).startswith("it has disclosed variables that were")
+    assert members.show("A", {"X": ((100, 100), (300, 300))}, real_places={"X": 2}) == ""
+    (x,) = members.robots["A"].robot.variables
+    assert x.domain.label(300) == 3.0
+
+
 def test_two_that_show_one_variable_are_both_named() -> None:
     members = NetworkMembers()
     for name in ("A", "C"):

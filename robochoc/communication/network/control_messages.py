@@ -129,9 +129,11 @@ class Joined(_Message, frozen=True):
 
 
 class DomainAnswer(_Message, frozen=True):
-    """Contains the domains that the master has requested."""
+    """Contains the domains that the master has requested. For `symbolic` and `real_places` see `Profile`."""
 
     variables: dict[str, Ranges]
+    symbolic: tuple[str, ...] = ()
+    real_places: dict[str, int] = {}
 
 
 class Exchanged(NamedTuple):

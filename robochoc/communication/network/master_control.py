@@ -253,8 +253,8 @@ class MasterControl(MasterLoop):
                 self._note_failure(name, self.state.handle(name, message))
             case Joined(incarnation, card):
                 member.join(incarnation, card)
-            case DomainAnswer(variables):
-                self._note_failure(name, self.members.show(name, variables))
+            case DomainAnswer(variables, symbolic, real_places):
+                self._note_failure(name, self.members.show(name, variables, symbolic, real_places))
             case Events(events):
                 self.events.relay_from(name, events)
             case RobotFailed(why, unsupported, elsewhere):

@@ -7,6 +7,8 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import field
 from types import MappingProxyType
 
+import msgspec
+
 from robochoc.communication.network.access import ALL
 from robochoc.communication.network.control_messages import SearchTask
 from robochoc.communication.network.plausibility import Declarations
@@ -224,21 +226,37 @@ class NetworkMembers:
                 unseen[name] = tuple(variable for variable in variables if variable not in known)
         return {name: variables for name, variables in unseen.items() if variables}
 
-    def show(self, name: str, variables: Mapping[str, Ranges]) -> str:
-        """Record a robot's answer about its `unseen` variables. Return why the answer is invalid, or an empty text."""
+    def show(
+        self,
+        name: str,
+        variables: Mapping[str, Ranges],
+        symbolic: Sequence[str] = (),
+        real_places: Mapping[str, int] = MappingProxyType({}),
+    ) -> str:
+        """Record a robot's answer about its `unseen` variables. Return why the answer is invalid, or an empty text.
+
+        For `symbolic` and `real_places` see `Profile`.
+        """
         member = self.robots[name]
         wanted = self.unseen().get(name, ())
         owners = self._owners()
         for variable in variables:
             if owners.get(variable, name) != name:
                 return f"the variable {variable} is {owners[variable]}'s, and {name}'s too"
-        if not variables.keys() <= {*wanted, *member.asked}:
+        if not {*variables, *symbolic, *real_places} <= {*wanted, *member.asked}:
             return "it has disclosed variables that were not requested"
         shown = {variable: variables[variable] for variable in wanted if variable in variables}
+        before = member.profile
+        profile = msgspec.structs.replace(
+            before,
+            symbolic=tuple(dict.fromkeys([*before.symbolic, *symbolic])),
+            real_places={**before.real_places, **real_places},
+        )
         try:
-            visible_robot(member.profile, {**member.shown_later, **shown})
+            visible_robot(profile, {**member.shown_later, **shown})
         except ProfileError as bad:
             return str(bad)
+        member.profile = profile
         member.asked.update(wanted)
         member.shown_later.update(shown)
         return ""

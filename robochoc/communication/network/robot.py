@@ -381,10 +381,13 @@ class NetworkRobot:
                 self._masters.note_refusal(why)
                 raise RunOverError(f"the master does not admit {self._robot.name}: {why}", failed=True, elsewhere=True)
             case DomainRequest(variables):
-                domains = {variable.name: variable.domain for variable in self._robot.variables}
-                self._send_to_master(
-                    DomainAnswer({name: ranges_of(domains[name]) for name in variables if name in domains})
+                asked = {one.name: one.domain for one in self._robot.variables if one.name in variables}
+                answer = DomainAnswer(
+                    {name: ranges_of(asked[name]) for name in variables if name in asked},
+                    tuple(name for name, domain in asked.items() if domain.symbols),
+                    {name: domain.real.places for name, domain in asked.items() if domain.real},
                 )
+                self._send_to_master(answer)
             case Revoked(name):
                 self._channel.revoke(name)
             case Leave(why, failed, elsewhere):
