@@ -38,6 +38,9 @@ _REACHES = {1: 6, 2: 4, 3: 2}
 _MOST_POINTS = 65
 """The maximum number of points of a grid that becomes denser, because it has no solution."""
 
+_USED = 0.98
+"""The part of the time until a deadline that grids may use."""
+
 SolveGrid = Callable[[Team, Options, int, str], Outcome]
 """A function that solves a team on its present grids, with options. It receives their number and a description."""
 
@@ -90,27 +93,30 @@ def solve_on_grids(team: Team, options: Options, solve_grid: SolveGrid) -> Outco
     team_now = _with_values(team, options.start, grids)
     best: Outcome | None = None
     history: list[GridSearch] = []
-    moves, began = 0, time.monotonic()
+    moves, began, limit_s, deadline = 0, time.monotonic(), options.limit_s, options.deadline
     while True:
         step = max(grid.step for grid in grids.values())
+        if deadline is not None:
+            options = replace(options, deadline=_next_deadline(deadline, time.monotonic() - began, best))
         outcome = solve_grid(team_now, options, len(history), f"grids with the step {step / scale}")
         history.append(GridSearch(step / scale, outcome.verdict, outcome.cost))
         best = outcome if best is None else _better(team, best, outcome)
-        is_over = len(history) == MAX_GRIDS or outcome.lost or outcome.deadline is not None
-        is_over = is_over or _is_over(options, best, time.monotonic() - began)
+        is_over = len(history) == MAX_GRIDS or bool(outcome.lost)
+        is_over = is_over or _is_over(options, best, limit_s, time.monotonic() - began)
         if is_over or (best.assignment and team.kind == ProblemKind.DISCSP):
             break
         if best.assignment:
             moves = moves + 1 if moves < _MOST_MOVES and _is_at_edge(grids, best) else 0
             finer = {name: _around(grid, best.assignment.get(name), least, moves) for name, grid in grids.items()}
         else:
-            finer = {name: _denser(grid) for name, grid in grids.items()}
-        if finer == grids or max(2 * grid.reach for grid in finer.values()) > _MOST_POINTS:
+            is_unfinished = deadline is not None and outcome.verdict == Verdict.UNKNOWN
+            finer = grids if is_unfinished else {name: _denser(grid) for name, grid in grids.items()}
+        if (finer == grids and best.assignment) or max(2 * grid.reach for grid in finer.values()) > _MOST_POINTS:
             break
         grids, team_now = finer, _on_grids(team, finer)
         options = _next_options(options, best, outcome)
-    is_late = options.limit_s is not None and time.monotonic() - began >= options.limit_s
-    return _certified(team, replace(best, grids=tuple(history)), is_late=is_late)
+    best = replace(best, grids=tuple(history), deadline=None if best.deadline is None else deadline)
+    return _certified(team, best, None if limit_s is None else began + limit_s)
 
 
 def _first_grid(real: RealInterval, domain: Domain, dimensions: int) -> _Grid:
@@ -178,10 +184,16 @@ def _next_options(options: Options, best: Outcome, last: Outcome) -> Options:
     return replace(options, messages=messages, start=start, kill=())
 
 
-def _is_over(options: Options, best: Outcome, spent_s: float) -> bool:
-    """Return whether a limit is reached."""
+def _next_deadline(deadline: float, spent_s: float, best: Outcome | None) -> float:
+    """Return the deadline of the next grid: half of the remaining time, or all of it if no answer was found so far."""
+    return deadline if best is not None and not best.assignment else (deadline + spent_s) / 2
+
+
+def _is_over(options: Options, best: Outcome, limit_s: float | None, spent_s: float) -> bool:
+    """Return whether a limit is reached. With a deadline, little time is left at last, and not used."""
+    part = 1 if options.deadline is None else _USED
     messages = sum(best.metrics.messages.values())
-    return (options.limit_s is not None and spent_s >= options.limit_s) or (
+    return (limit_s is not None and spent_s >= part * limit_s) or (
         options.messages is not None and messages >= options.messages
     )
 
@@ -200,10 +212,10 @@ def _better(team: Team, best: Outcome, new: Outcome) -> Outcome:
     return replace(min(new, best, key=rank), metrics=best.metrics + new.metrics)
 
 
-def _certified(team: Team, best: Outcome, *, is_late: bool) -> Outcome:
+def _certified(team: Team, best: Outcome, until: float | None) -> Outcome:
     """Return an outcome whose verdict and bound hold for all values, not only for those on grids.
 
-    If the run `is_late`, the bound is that of the whole intervals, without branching.
+    The search for the bound ends at `until`, a time of the monotonic clock.
     """
     best = replace(best, bound=None, count=None, optima=None, confirmed=False, confirmed_by=())
     if best.verdict == Verdict.OPTIMAL:
@@ -212,7 +224,10 @@ def _certified(team: Team, best: Outcome, *, is_late: bool) -> Outcome:
         return best
     from robochoc.verification.real_bound import EVALUATIONS, certificate  # noqa: PLC0415 - start-up: few teams need it
 
-    proof = certificate(team, best.assignment, 0 if is_late else EVALUATIONS)
+    def is_late() -> bool:
+        return until is not None and time.monotonic() >= until
+
+    proof = certificate(team, best.assignment, 0 if is_late() else EVALUATIONS, is_late)
     if proof.is_infeasible:
         return replace(best, verdict=Verdict.NO_SOLUTION, verified=True, witness=None, reason=_INFEASIBLE)
     if best.verdict == Verdict.NO_SOLUTION:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import heapq
 import itertools
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -96,13 +96,16 @@ class _Open(NamedTuple):
     slopes: Mapping[str, Interval]
 
 
-def certificate(team: Team, best: Assignment, evaluations: int = EVALUATIONS) -> Certificate:
+def certificate(
+    team: Team, best: Assignment, evaluations: int = EVALUATIONS, is_late: Callable[[], bool] = lambda: False
+) -> Certificate:
     """Return a bound of the cost of all assignments of `team`, on any grid.
 
     Args:
         team: The team, without normalised costs. Robots must not withdraw.
         best: The best known assignment, or no values.
         evaluations: The maximum number of evaluations of a cost over a box, for all parts together.
+        is_late: Returns whether the search must end.
     """
     units = common_units(robot.costs for robot in team.robots)
     sign = -1 if units.maximize else 1
@@ -111,14 +114,14 @@ def certificate(team: Team, best: Assignment, evaluations: int = EVALUATIONS) ->
     work = sum(problem.work for problem in problems) or 1
     total = 0
     for problem in problems:
-        bound = _bound(problem, best, evaluations * problem.work // work)
+        bound = _bound(problem, best, evaluations * problem.work // work, is_late)
         if bound is None:
             return Certificate(None, is_infeasible=True)
         total += bound
     return Certificate(units.in_user_units(sign * -(-total // finest)))  # costs are integers: the bound is rounded up
 
 
-def _bound(problem: _Problem, best: Assignment, evaluations: int) -> int | None:
+def _bound(problem: _Problem, best: Assignment, evaluations: int, is_late: Callable[[], bool]) -> int | None:
     """Return a lower bound of the costs; None if the hard constraints cannot be satisfied."""
     count = itertools.count()
     known = _cost_at(problem, best) if problem.box.keys() <= best.keys() else None
@@ -128,7 +131,7 @@ def _bound(problem: _Problem, best: Assignment, evaluations: int) -> int | None:
     tangents = max(1, min(_TANGENTS, evaluations // max(1, len(problem.costs))))
     first = first._replace(bound=max(first.bound, _convex_bound(problem, best, tangents)))
     waiting, closed = [first], [] if known is None else [known]
-    while waiting and evaluations > 0 and (known is None or waiting[0].bound < known):
+    while waiting and evaluations > 0 and not is_late() and (known is None or waiting[0].bound < known):
         one = heapq.heappop(waiting)
         halves = _halves(one, () if best else problem.restricted)
         if not halves and not _is_undefined(problem, one.box):

@@ -20,7 +20,7 @@ from robochoc.model.cost_units import CostUnits
 from robochoc.model.costs import normalized
 from robochoc.model.expression import Type, parse
 from robochoc.model.expression.fixed_point import VALUE_PLACES, fixed_point
-from robochoc.model.outcome import Verdict
+from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.model.real import RealInterval, RealParameters, grid
 from robochoc.model.symbols import real_places
@@ -28,6 +28,7 @@ from robochoc.replay import replay
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
 from robochoc.run.recording import journal_header, objective_to_record
+from robochoc.run.refinement import solve_on_grids
 from robochoc.solver.errors import UnsupportedError
 from robochoc.verification import real_bound
 from robochoc.verification.checker import check_user_cost, violations
@@ -136,6 +137,25 @@ def test_grids_that_are_not_refined_prove_nothing(protocol: str) -> None:
     assert outcome.bound is None
     with pytest.raises(UnsupportedError, match="--verify confirms optima of integer variables"):
         solve(team, replace(options, verify=True))
+
+
+@pytest.mark.parametrize("unsolved", [0, 1])
+def test_each_grid_has_half_of_the_time_until_the_deadline(unsolved: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(real_bound, "EVALUATIONS", 200)
+    team, deadline, asked = swarm(agents=2), 1e6, list[float]()
+
+    def solve_grid(now: Team, options: Options, number: int, _: str) -> Outcome:
+        asked.append(options.deadline or 0)
+        values = {name: next(iter(one.domain)) for name, one in now.variables.items()} if number >= unsolved else {}
+        verdict = Verdict.SOLUTION if values else Verdict.UNKNOWN
+        cost = 1 if values else None
+        bare = Outcome(verdict, team="", protocol="dsa", runtime=Runtime.SIMULATOR, seed=0)
+        return replace(bare, assignment=values, cost=cost, deadline=options.deadline)
+
+    outcome = solve_on_grids(team, Options(protocol="dsa", deadline=deadline), solve_grid)
+    assert outcome.deadline == deadline
+    half = pytest.approx(deadline / 2, rel=0.01)
+    assert asked[:3] == [half, deadline if unsolved else half, half]
 
 
 def test_the_master_learns_of_real_variables_from_profiles() -> None:
