@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable
 from decimal import Decimal
 from fractions import Fraction
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -18,9 +19,13 @@ from robochoc.model.expression.fixed_point import fixed_point
 from robochoc.model.expression.tree import Type
 from robochoc.model.problem import Team
 from robochoc.model.waypoints import position
+from robochoc.modelling.numbers import exact
 from robochoc.modelling.real_terms import RealTranslator
 from robochoc.modelling.terms import Term, number
 from tests.support.cases import looped
+from tests.support.examples import drawn
+
+WIND = ((-1, Fraction(1, 4)), (2, Fraction(3, 4)))
 
 
 def rail() -> robochoc.Model:
@@ -90,6 +95,26 @@ def test_a_condition_that_never_holds_excludes_all_real_numbers() -> None:
     model.add(x - x >= 0.5)
     model.minimize(x)
     assert model.solve("dpop").verdict == Verdict.NO_SOLUTION
+
+
+def test_expected_costs_on_grids_agree_with_enumeration() -> None:
+    chance = drawn("real and random variables")
+    for _ in range(6):
+        model = robochoc.Model("chance")
+        x = model.robot("A").real("x", -1, chance.choice([1, 3]), precision=0.1, points=3)
+        n = model.robot("B").variable("n", range(3))
+        wind = model.random("wind", {-1: 0.25, 2: 0.75}, seen_by=[n] if chance.random() < 0.5 else [])
+        cost = chance.choice([2, 0.5]) * (x - n - wind) ** 2 + chance.choice([abs(x - wind), x * n, x * wind])
+        model.minimize(cost)
+        policies = product([-1, 0, 1] if x.codes.ends[1] == 10 else [-1, 1, 3], range(3), range(3))
+        seen = "n.wind" in " ".join(model.team.variables)
+        best = min(
+            sum(share * exact(cost.value({x: a, n: c if seen and w > 0 else b, wind: w})) for w, share in WIND)
+            for a, b, c in policies
+        )
+        solution = model.solve(chance.choice(["dpop", "afb"]))
+        assert solution.verdict == Verdict.SOLUTION
+        assert Fraction(solution.cost or 0) == best
 
 
 @looped(("wrong", "message"), [
