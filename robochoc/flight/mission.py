@@ -129,7 +129,7 @@ class MissionBuilder:
         others: Crafts at other times, which are also inside the box.
         leaving: The number of drones that will leave. None: all drones may leave.
         scale: The length of a unit, in metres. Default: the map's scale, or `UNIT_M`, or less if the box would be too
-            large.
+            large and no place depends on real variables.
         ground: A map of the ground. Robots without a waypoint in their files then stay in place. If the map has walls,
             withdrawn drones return to their homes.
         exact: True for places as in the topics, even if drones would collide there; only for drones that are not
@@ -162,7 +162,8 @@ class MissionBuilder:
         self._crafts_in_order = crafts
         self.layout: MissionLayout = layout_of(crafts, others, ground)
         given = ground.scale if scale is None and ground else scale
-        self.scale = _scale(self.layout.axes) if given is None else given
+        usual = UNIT_M if any(craft.is_exact for craft in crafts) else _scale(self.layout.axes)
+        self.scale = usual if given is None else given
         if ground and ground.scale is not None:
             self.layout = self.layout.in_metres(self.scale)
         self._edge = self.layout.edge(len(crafts) if leaving is None else leaving)
@@ -185,7 +186,7 @@ class MissionBuilder:
         goals: dict[int, Goal] = {}
         for number, (craft, place) in enumerate(zip(crafts, places, strict=True)):
             if place is not None:
-                goals[number] = Goal(self._metres(place))
+                goals[number] = Goal(self._exact_metres(craft) or self._metres(place))
             elif _owner(craft) in gone:
                 goals[number] = Goal(self._metres(self._landing_point(number)), lands=True)
         return Leg(epoch.opened_by, epoch.verdict, goals, epoch.cost)
@@ -263,6 +264,12 @@ class MissionBuilder:
         if not self._exact or self._ground is not None or levels.first < 0:
             return point
         return point[0], point[1], levels.at(0)
+
+    def _exact_metres(self, craft: Craft) -> Point | None:
+        """Return the place of a craft over real variables, without rounding to the axes; None for other crafts."""
+        if not craft.is_exact or craft.cell is None or craft.level is None:
+            return None
+        return craft.cell[0] * self.scale, craft.cell[1] * self.scale, craft.level * self.scale
 
     def _metres(self, point: Point) -> Point:
         x, y, z = (axis.value(cell) * self.scale for axis, cell in zip(self.layout.axes, point, strict=True))

@@ -90,9 +90,9 @@ def test_sensors_are_placed_near_targets() -> None:
 
 def test_goals_without_a_map_are_exact_and_in_metres() -> None:
     team = swarm(agents=2, side=100)
-    values = {"x1": 137, "y1": 9_999, "x2": 160, "y2": 9_951}
+    values = {"x1": 137, "y1": 9_999, "x2": 9_960, "y2": 51}
     mission = mission_of(outcome_of(values), team)
-    assert [goal.at for goal in mission.legs[0].goals.values()] == [(1.37, 99.99, 1), (1.6, 99.51, 1)]
+    assert [goal.at for goal in mission.legs[0].goals.values()] == [(1.37, 99.99, 1), (99.6, 0.51, 1)]
 
 
 @count("teams", 20, 200)
