@@ -54,6 +54,7 @@ class Given(Event, frozen=True):
         empty: The variables without remaining values, which a file cannot express (`journal/team_events.py`).
         told_in: The user's units of costs, if they differ from the protocols' minimised integers of 0 or more: whether
             costs are maximised, their decimal places, and a constant that is added to the sum (`model/costs.py`).
+        any_step: True if the values of real variables may be anywhere in their intervals (`model/real.py`).
     """
 
     order: tuple[str, ...]
@@ -69,6 +70,7 @@ class Given(Event, frozen=True):
     shown: dict[str, tuple[str, ...]] = {}
     empty: tuple[str, ...] = ()
     told_in: tuple[bool, int, int] | UnsetType = UNSET
+    any_step: bool | UnsetType = UNSET
 
 
 class Registered(Event, frozen=True):

@@ -21,6 +21,7 @@ from robochoc.journal.events import Began, Given
 from robochoc.model.cost_units import PLAIN_COSTS, Cost, CostUnits
 from robochoc.model.costs import flat_units
 from robochoc.model.problem import INFINITE, Constraint, Relation, Robot, Team, Variable
+from robochoc.model.team_edits import on_intervals
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
 from robochoc.solver.explanation import Invalidated
 from robochoc.system.errors import RobochocError
@@ -65,6 +66,7 @@ class TeamWriter:
             shown={robot.name: robot.shown for robot in team.robots if robot.shown},
             empty=tuple(name for name, variable in team.variables.items() if not variable.domain),
             told_in=_units(flat_units(team)),
+            any_step=any(one.domain.real and one.domain.real.any_step for one in team.variables.values()) or UNSET,
         )
         try:
             files = {robot.name: self._file(robot) for robot in team.robots}
@@ -111,6 +113,8 @@ class TeamReader:
         if robots and given.told_in is not UNSET:
             robots = (replace(robots[0], user_units=CostUnits(*given.told_in)), *robots[1:])
         team = Team(self._name, robots)
+        if given.any_step is True:
+            team = on_intervals(team)
         _check(team)
         return team
 

@@ -88,6 +88,11 @@ class Domain:
     def __contains__(self, value: object) -> bool:
         return any(value in part for part in self.ranges)
 
+    @property
+    def possible(self) -> Domain | range:
+        """The values that a robot may choose: those of the domain, or all steps of its interval (`any_step`)."""
+        return range(self.real.low, self.real.high + 1) if self.real and self.real.any_step else self
+
     def label(self, value: int) -> float | str:
         """Return `value`, its name if the domain is symbolic, or its number if the domain is real."""
         if self.real is not None:

@@ -314,10 +314,10 @@ def _bounds(constraint: Constraint, body: Expression, parameters: tuple[str, ...
     if len(names) > 1 and can_be_restated(constraint):  # the costs for fewer robots may differ
         low, high = bounds(body, defaultdict(lambda: ANY_INTEGER))
         return int(low), int(high)
-    size = math.prod(len(domains[name]) if name in domains else MAX_TRIED + 1 for name in names)
+    size = math.prod(len(domains[name].possible) if name in domains else MAX_TRIED + 1 for name in names)
     if size <= MAX_TRIED:
         tried = replace(constraint, definition=Function("", parameters, body))
-        values = itertools.product(*(domains[name] for name in names))
+        values = itertools.product(*(domains[name].possible for name in names))
         costs = [tried.price(dict(zip(names, one, strict=True))) for one in values]
         finite = [int(cost) for cost in costs if cost < INFINITE] or [0]
         return min(finite), max(finite)
@@ -337,5 +337,6 @@ def _interval(term: str | int, domains: Domains) -> Interval:
         return Interval(term, term)
     if term not in domains or not domains[term]:
         return ANY_INTEGER
-    ranges = domains[term].ranges
+    possible = domains[term].possible
+    ranges = (possible,) if isinstance(possible, range) else possible.ranges
     return Interval(ranges[0][0], ranges[-1][-1])

@@ -33,11 +33,13 @@ class RealInterval:
         low: The lower end, in steps.
         high: The upper end, in steps.
         places: The decimal places of the precision: a step is 10**-`places`.
+        any_step: True if robots may choose any step, and not only the values on the grid.
     """
 
     low: int
     high: int
     places: int = DEFAULT_PLACES
+    any_step: bool = False
 
     def number(self, steps: int) -> float:
         """Return a number of steps in the user's unit."""

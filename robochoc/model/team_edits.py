@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable
 from dataclasses import replace
 
 from robochoc.model.absence import DroppedConstraint, broken, restated
-from robochoc.model.problem import Child, Constraint, Parent, Robot, Team, WhenAbsent
+from robochoc.model.problem import Child, Constraint, Parent, Robot, Team, Variable, WhenAbsent
 from robochoc.system.errors import RobochocError
 
 MAX_SHOWN = 60
@@ -126,6 +126,17 @@ def dropped_constraints(team: Team, absent: Collection[str]) -> tuple[DroppedCon
     """Return the constraints dropped because robots in their scopes have left `team` or are in `absent`."""
     before = (one for one in team.dropped if any(name not in team for name in one.robots))
     return (*before, *Absence(team, absent).dropped)
+
+
+def on_intervals(team: Team) -> Team:
+    """Return `team` for a continuous protocol: robots may choose any step of their real variables."""
+
+    def opened(variable: Variable) -> Variable:
+        real = variable.domain.real and replace(variable.domain.real, any_step=True)
+        return replace(variable, domain=replace(variable.domain, real=real))
+
+    robots = (replace(robot, variables=tuple(map(opened, robot.variables))) for robot in team.robots)
+    return replace(team, robots=tuple(robots))
 
 
 def with_shared_constraint(team: Team, constraint: Constraint) -> Team:

@@ -49,6 +49,7 @@ class Traits:
         counts: Its robots also count the optima, or the solutions if there are no costs (`--count`).
         fronts: Its robots find the Pareto front of several objectives.
         arrays: It has an array implementation that runs a whole team at once (`communication/arrays`).
+        continuous: Its robots choose real numbers anywhere in their intervals, so grids are not refined.
         bears_loss: It continues when messages are lost in transit (`Protocol.miss`, `Protocol.go_on`).
         allocates: It accepts only task allocations: teams whose only shared constraints are that a task is done by at
             most one robot, and in which each robot may do none (`solver/exclusions.py`).
@@ -87,6 +88,7 @@ class Traits:
     counts: bool = False
     fronts: bool = False
     arrays: bool = False
+    continuous: bool = False
     bears_loss: bool = False
     allocates: bool = False
     congestion: bool = False

@@ -21,9 +21,11 @@ from robochoc.model.outcome import GridSearch, Outcome, Verdict
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.model.real import RealInterval
 from robochoc.model.symbols import real_places
+from robochoc.model.team_edits import on_intervals
 from robochoc.run.defaults import CENTRAL
 from robochoc.run.evaluation import NOT_ON_GRIDS
 from robochoc.run.options import Options
+from robochoc.run.registry import protocol_named
 from robochoc.solver.agent_problem import StartValues
 
 if TYPE_CHECKING:
@@ -79,6 +81,8 @@ def refines(team: Team, options: Options) -> bool:
 def solve_on_grids(team: Team, options: Options, solve_grid: SolveGrid) -> Outcome:
     """Return the best assignment on all grids, with a bound of the cost of any assignment.
 
+    A continuous protocol needs no finer grids: its robots choose values anywhere in the intervals.
+
     Args:
         team: The team, without normalised costs.
         options: How to run, with the name of a protocol.
@@ -91,6 +95,9 @@ def solve_on_grids(team: Team, options: Options, solve_grid: SolveGrid) -> Outco
     scale = 10 ** max(grid.real.places for grid in grids.values())
     least = max(1, round((options.refine or 0) * scale))
     team_now = _with_values(team, options.start, grids)
+    if options.protocol != CENTRAL and protocol_named(options.protocol).traits.continuous:
+        until = None if options.limit_s is None else time.monotonic() + options.limit_s
+        return _certified(team, solve_grid(on_intervals(team_now), options, 0, ""), until)
     best: Outcome | None = None
     history: list[GridSearch] = []
     moves, began, limit_s, deadline = 0, time.monotonic(), options.limit_s, options.deadline

@@ -27,6 +27,7 @@ from robochoc.solver.encoding import Cost
 from robochoc.solver.errors import TooLargeError
 from robochoc.solver.explanation import KeyedConstraint, constraints_above, parts_below
 from robochoc.solver.filters import Filters
+from robochoc.solver.points import Point, Points
 from robochoc.solver.shared_constraint import (
     UNKNOWN,
     Conflict,
@@ -169,6 +170,7 @@ class LocalProblem:
         self.checks = 0
         self.allows_undeclared = False
         self._places: dict[Value, int] | None = None
+        self._adopted: dict[int, Point] = {}
         self._rank = rank
         self._part = part
         self._set_constraints(part, OwnValues(robot.interface, self.values))
@@ -255,7 +257,39 @@ class LocalProblem:
 
     def solution(self, index: int) -> dict[str, int]:
         """Return the values of all variables of this robot for `values[index]`. Empty if the robot is withdrawn."""
+        point = self._adopted.get(index)
+        if point is not None:
+            return dict(zip(self._domain.variables, point.solution, strict=True))
         return self._domain.solution(index)
+
+    def points(self) -> Points:
+        """Return the positions of this robot in the whole intervals of its real variables."""
+        return Points(self._part, self.values, self.charges)
+
+    def cost_at(self, point: Point, view: Mapping[str, Value]) -> LexicographicCost:
+        """Return the cost of `point` in `view`; each constraint without unknown variables is one check.
+
+        The values in `view` must be possible (`refuse_value`).
+        """
+        paid = [
+            one.cost_at(others, point.value)
+            for one in self._constraints
+            if (others := one.other_values(view)) is not None
+        ]
+        self.checks += len(paid)
+        return _lexicographic_cost([*point.charges, *paid])
+
+    def adopt(self, point: Point) -> int:
+        """Return the index of `point` in `values`; a point between the values becomes the last one.
+
+        The costs of such a value are known only to `cost_at`.
+        """
+        if point.place is not None:
+            return point.place
+        if self._adopted.get(len(self.values) - 1) != point:
+            self._adopted[len(self.values)] = point
+            self.values = (*self.values, point.value)
+        return len(self.values) - 1
 
     def conflict(self, index: int, view: Mapping[str, Value], since: int = -1) -> Conflict | None:
         """Return the conflict of `values[index]` with `view` in the first violated constraint. None: no conflict.
@@ -405,7 +439,7 @@ class LocalProblem:
         if any(part is not None for part in value):  # otherwise the robot is withdrawn
             domains = self._part.known.domains
             for name, part in zip(names, value, strict=True):
-                if part is None or part not in domains[name]:
+                if part is None or part not in domains[name].possible:
                     raise ValueError(f"{name} of {robot} cannot be {part}")
 
     def charged(self, view: Mapping[str, Value]) -> list[Charged]:

@@ -121,8 +121,9 @@ def refuse_large(key: str, entries: int) -> None:
 
 
 def _plain(domain: Domain) -> Domain | range:
-    """Return `domain` as a range, which is faster, if it consists of a single range."""
-    return domain.ranges[0] if len(domain.ranges) == 1 else domain
+    """Return the possible values of `domain` as a range, which is faster, if they are a single range."""
+    possible = domain.possible
+    return domain.ranges[0] if possible is domain and len(domain.ranges) == 1 else possible
 
 
 class SharedConstraint:
@@ -329,6 +330,10 @@ class SharedConstraint:
         if prices is None:
             prices = self._costs_by[part] = self.costs((part,))
         return prices
+
+    def cost_at(self, others: OtherValues, own: Value) -> Cost:
+        """Return the cost of the own value `own`, which need not be in the compiled domain. Nothing is stored."""
+        return self._cost((*others, *[own[place] for place in self._places]))
 
     @property
     def counts_when_absent(self) -> bool:

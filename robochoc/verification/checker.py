@@ -49,7 +49,7 @@ def violations(team: Team, assignment: Assignment, withdrawn: Collection[str] = 
     for name, variable in flying.items():
         if name not in assignment:
             yield f"{name} has no value"
-        elif assignment[name] not in variable.domain:
+        elif assignment[name] not in variable.domain.possible:
             yield f"{name} = {assignment[name]} is not in its domain"
     yield from (f"{name} is not a variable of a robot that flies" for name in assignment if name not in flying)
     for constraint in constraints_in_force(team, withdrawn):

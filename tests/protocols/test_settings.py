@@ -12,6 +12,7 @@ PART, POSITIVE_PART = "it must be from 0 to 1", "it must be more than 0 and at m
 
 
 @looped(("protocol", "setting", "values", "rule"), [
+    ("c-cocoa", "moves", "-1 many", "moves"),
     ("dpop", "memory", "0 -1 much", "memory"),
     ("dsa", "probability", "0 1.5 nan -1", POSITIVE_PART),
     ("dsa", "variant", "F", "variant"),
@@ -50,6 +51,8 @@ PART, POSITIVE_PART = "it must be from 0 to 1", "it must be more than 0 and at m
     ("pc-syncbb", "bits", "30 5 8192", "bits is .*one of 31, 61"),
     ("pc-syncbb", "comparisons", "0 10000001", "comparisons is .*from 1 to 10,000,000"),
     ("pc-syncbb", "search", "closed", "search"),
+    ("pfd", "particles", "0 10001", "particles is .*from 1 to 10,000"),
+    ("pfd", "w", "-1 11 nan", "w is .*from 0 to 10"),
     ("regret-matching", "cycles", "0", "it must be 1 or more"),
     ("regret-matching", "inertia", "1", "it must be 0 or more, and less than 1"),
     ("regret-matching", "variant", "RM", "'RM' is not allowed; allowed: rm, rm[+]"),

@@ -33,6 +33,7 @@ MOST_TELLING = {
     "adopt-k": (("odd", ScheduleName.CONCURRENT), ("patrol", ScheduleName.RANDOM)),
     "awc": (("queens3d-2", ScheduleName.CONCURRENT), ("queens3d-3-full", ScheduleName.RANDOM)),
     "bounded-maxsum": (("queens3d-2", ScheduleName.CONCURRENT), ("odd", ScheduleName.RANDOM)),
+    "c-cocoa": (("odd", ScheduleName.CONCURRENT), ("patrol", ScheduleName.RANDOM)),
     "disfc": (("queens3d-2", ScheduleName.RANDOM), ("queens3d-3-full", ScheduleName.CONCURRENT)),
     "dsa": (("odd", ScheduleName.CONCURRENT), ("queens3d-3-full", ScheduleName.RANDOM)),
     "list-dpop": (("odd", ScheduleName.CONCURRENT), ("patrol", ScheduleName.RANDOM)),
@@ -44,6 +45,7 @@ MOST_TELLING = {
     "p-dsa": (("prices", ScheduleName.CONCURRENT), ("prices", ScheduleName.RANDOM)),
     "p-maxsum": (("prices", ScheduleName.CONCURRENT), ("prices", ScheduleName.RANDOM)),
     "p-mgm": (("prices", ScheduleName.CONCURRENT), ("prices", ScheduleName.RANDOM)),
+    "pfd": (("odd", ScheduleName.CONCURRENT), ("patrol", ScheduleName.RANDOM)),
     "pc-syncbb": (("prices", ScheduleName.CONCURRENT), ("prices", ScheduleName.RANDOM)),
     "sfb": (("odd", ScheduleName.CONCURRENT), ("patrol", ScheduleName.RANDOM)),
 }
@@ -101,7 +103,7 @@ def journal(team: Team, protocol: str, schedule: ScheduleName) -> bytes:
     withdraw = None if team.dynamic or team.kind is ProblemKind.DISWCSP else Withdrawal.MAXIMAL
     known = protocol_named(protocol).settings
     known_bits = hasattr(known, "bits")
-    small = {"cycles": "1" if known_bits else "3", "samples": "3", "bits": "31"}
+    small = {"cycles": "1" if known_bits else "3", "samples": "3", "bits": "31", "particles": "3"}
     settings = {name: value for name, value in small.items() if hasattr(known, name)}
     options = Options(
         protocol=protocol,

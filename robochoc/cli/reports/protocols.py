@@ -121,6 +121,7 @@ def _in_a_line(traits: Traits) -> str:
         *(["also asymmetric costs"] if traits.asymmetric else []),
         *(["continues when the problem changes"] if traits.dynamic else []),
         *(["also as arrays (--runtime arrays)"] if traits.arrays else []),
+        *(["real numbers anywhere in their intervals"] if traits.continuous else []),
         *(["task allocations only"] if traits.allocates else []),
         *(["tolerates lost messages"] if traits.bears_loss else []),
         *([f"use when: {traits.use_when}"] if traits.use_when else []),

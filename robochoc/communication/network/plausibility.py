@@ -123,7 +123,7 @@ def _faults_of_values(
         yield "it has reported values, and that it has none"
     if len(values) > MOST_VARIABLES:
         yield f"it has reported more than {MOST_VARIABLES:,} variables"
-    if values and not all(values.get(variable) in domain for variable, domain in own.items()):
+    if values and not all(values.get(variable) in domain.possible for variable, domain in own.items()):
         yield "it has reported values that it cannot have"
     for variable in values.keys() - own.keys():
         if not is_name(variable) or len(variable) > LONGEST_NAME:

@@ -397,11 +397,15 @@ class CoCoA(Protocol):
         best = [place for place, total in enumerate(totals) if total == least]
         if len(best) <= self.bound or not waiting:
             self.state = SearchState.DONE
-            self.value = one_of(self.chance, best)
+            self.value = self._chosen(one_of(self.chance, best))
             self._send_to_undecided(SetValue(self.problem.values[self.value]))
         else:
             self.state = SearchState.HOLD
             self._send_to_undecided(Hold())
+
+    def _chosen(self, place: int) -> int:
+        """Return the index of this robot's final value; `place` is that of one of the best values."""
+        return place
 
     def _send_to_undecided(self, message: wire.Message) -> None:
         """Send a message to all neighbours that have no value yet."""
