@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import pytest
 
 from robochoc.model.costs import normalized
-from robochoc.model.problem import Team
+from robochoc.model.problem import Team, Value
 from robochoc.model.team_edits import on_intervals
 from robochoc.protocols.local_search.c_cocoa import CCoCoA
 from robochoc.protocols.local_search.cocoa import CostsAt, Inquiry, SetValue
@@ -22,7 +22,8 @@ def chosen(team: Team, costs: Sequence[tuple[int, int]], responses: Sequence[int
     it = robot_of(CCoCoA, on_intervals(normalized(team)), "RA")
     it.settings = read_settings(CCoCoA, settings)  # type: ignore[assignment, misc]
     it.start()
-    assert sent(it) == [("RB", Inquiry([(0,), (50,), (100,)][-len(costs) :], {}))]
+    points: list[Value] = [(0,), (50,), (100,)]
+    assert sent(it) == [("RB", Inquiry(points[-len(costs) :], {}))]
     ((_, said),) = replies(it, ("RB", CostsAt([*costs], [(one,) for one in responses])))
     assert isinstance(said, SetValue)
     assert it.assignment == {"x": said.value[0]}
