@@ -12,9 +12,8 @@ from robochoc.model.team_edits import on_intervals
 from robochoc.protocols.local_search.c_cocoa import CCoCoA
 from robochoc.protocols.local_search.cocoa import CostsAt, Inquiry, SetValue
 from robochoc.protocols.settings import read_settings
-from tests.protocols.test_pfd import real_team
 from tests.support.agents import replies, robot_of, sent
-from tests.support.real_teams import real_constraint
+from tests.support.real_teams import real_constraint, real_team
 
 
 def chosen(team: Team, costs: Sequence[tuple[int, int]], responses: Sequence[int], **settings: str) -> int:

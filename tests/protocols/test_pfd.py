@@ -22,15 +22,7 @@ from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
 from tests.support.agents import assert_refused, replies, robot_of
 from tests.support.examples import drawn
-from tests.support.real_teams import PLACES, real_constraint
-
-
-def real_team(*constraints: Constraint) -> Team:
-    """RA owns x, RB owns xb: intervals from 0 to 10 with steps of 0.1, and grids of three points."""
-    domain = Domain("D", grid(0, 100, 3), real=RealInterval(0, 100, PLACES))
-    owned = {"RA": [Variable("x", domain)], "RB": [Variable("xb", domain)]}
-    costs = CostUnits(places=VALUE_PLACES)
-    return assemble("two", owned, constraints, kind=ProblemKind.DISWCSP, costs=costs)
+from tests.support.real_teams import PLACES, real_constraint, real_team
 
 
 def apart() -> Team:

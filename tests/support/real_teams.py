@@ -36,6 +36,14 @@ def real_constraint(name: str, body: str, scope: tuple[str, ...], *, hard: bool 
     return Constraint(name, Function(name, formals, steps, real=real, places=VALUE_PLACES), scope, scope)
 
 
+def real_team(*constraints: Constraint) -> Team:
+    """RA owns x, RB owns xb: intervals from 0 to 10 with steps of 0.1, and grids of three points."""
+    domain = Domain("D", grid(0, 100, 3), real=RealInterval(0, 100, PLACES))
+    owned = {"RA": [Variable("x", domain)], "RB": [Variable("xb", domain)]}
+    costs = CostUnits(places=VALUE_PLACES)
+    return assemble("two", owned, constraints, kind=ProblemKind.DISWCSP, costs=costs)
+
+
 def random_team(chance: Random, variables: int, width: int) -> Team:
     """Return a team of robots with one variable each, whose intervals have `width` steps of 0.1."""
 
