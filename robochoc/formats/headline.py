@@ -71,6 +71,7 @@ def _cost(outcome: Outcome) -> str:
         return ""
     if outcome.objectives:
         return "".join(f", {name} {cost_shown(cost)}" for name, cost in outcome.objectives.items())
-    if outcome.cost is None or not (outcome.cost or outcome.verdict == Verdict.OPTIMAL):
+    may_have_none = outcome.cost == 0 and isinstance(outcome.cost, int) and outcome.verdict != Verdict.OPTIMAL
+    if outcome.cost is None or may_have_none:
         return ""
     return f", cost {cost_shown(outcome.cost)}"

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from robochoc.model.expression import Apply, Constant, Expression, Name
-from robochoc.model.expression.tree import SYMBOLIC
+from robochoc.model.expression.tree import DECIMAL, SYMBOLIC
+from robochoc.model.expression.tree import text as expression_text
 
 _SIGNS = {
     "add": "+", "sub": "-", "mul": "·", "div": "/", "mod": "mod", "pow": "^",
@@ -40,6 +41,8 @@ class Infix:
             case Name(name):
                 actual = self._given.get(name, name)
                 return self._symbol(actual) if isinstance(actual, int) and name in self._symbolic else str(actual)
+            case Apply(operator, (Constant(), Constant())) if operator == DECIMAL:
+                return expression_text(expression)
             case Apply(operator, arguments):
                 said = self._applied(operator, arguments)
                 return f"({said})" if inner and operator in _SIGNS else said

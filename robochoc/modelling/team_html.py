@@ -99,7 +99,7 @@ def shown_values(values: Iterable[object]) -> str:
 
 def domain_text(domain: Domain) -> str:
     """Return the values of a domain as text; of many ranges, the first ones."""
-    if domain.symbols:
+    if domain.symbols or domain.real:
         return " ".join(str(domain.label(value)) for value in domain)
     shown = [f"{part[0]}..{part[-1]}" if len(part) > 1 else str(part[0]) for part in domain.ranges[:_MAX_RANGES]]
     return " ".join(shown) + (" ..." if len(domain.ranges) > _MAX_RANGES else "")

@@ -107,6 +107,14 @@ def seconds(name: str, value: object) -> float:
     return number
 
 
+def step(name: str, value: object) -> float:
+    """Convert the step of a grid, which may be infinite. Raises `OptionError` if it is negative or not a number."""
+    number = real(name, value)
+    if not number >= 0:
+        raise OptionError(_refusal(name, number, "a number of 0 or more"))
+    return number
+
+
 def flag(name: str, value: object) -> bool:
     """Convert a Boolean of any type."""
     if not isinstance(value, bool) and type(value).__name__ not in {"bool", "bool_"}:  # numpy's Boolean is not a bool

@@ -29,6 +29,7 @@ from robochoc.run.option_values import (
     samples,
     seconds,
     start_values,
+    step,
     text,
     texts_by_name,
 )
@@ -307,7 +308,7 @@ _CONVERTERS = MappingProxyType(
         "cluster": optional(text),
         "start": start_values,
         "cold": flag,
-        "refine": optional(real),
+        "refine": optional(step),
         "risk": one_of(Risk),
         "samples": optional(samples),
         "objectives": optional(objectives),

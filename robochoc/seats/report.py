@@ -102,7 +102,7 @@ class SeatReport:
         value: Its final value, by variable.
         cost: Its share of the team's cost: each constraint's cost is shared equally by the robots in it. None: a hard
             constraint of the team is violated.
-        regret: Its share minus its share in the certified optimum, in normalised costs; None: not known.
+        regret: Its share minus its share in the certified optimum, None: not known.
         messages: The messages that it sent, announcements included.
         bytes: Their size.
         texts: The texts among them.
@@ -275,17 +275,18 @@ def _coalition(group: tuple[str, ...], regrets: Mapping[str, float | None]) -> C
 
 
 def cost_shares(team: Team, assignment: Mapping[str, int]) -> dict[str, float]:
-    """Return each robot's share of the normalised cost: a constraint's cost is shared equally by its robots.
+    """Return each robot's share of the minimised cost in the user's unit: its robots pay a constraint's cost equally.
 
     Violated hard constraints count 0.
     """
+    unit: int = 10**team.user_units.places
     shares = dict.fromkeys(team.order, 0.0)
     for robot in team.robots:
         for constraint in robot.constraints():
             owners = {team.owner[name] for name in constraint.variables} or {robot.name}
             paid = constraint_cost(constraint, assignment)
             for name in owners if paid != INFINITE else ():
-                shares[name] += paid / len(owners)
+                shares[name] += paid / (len(owners) * unit)
     return shares
 
 

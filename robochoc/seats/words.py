@@ -53,9 +53,10 @@ def _rule(team: Team, constraint: Constraint, robot: Robot) -> Iterator[str]:
     definition = constraint.definition
     if not isinstance(definition, Relation):
         given = dict(zip(definition.parameters, constraint.parameters, strict=True))
-        text = Infix(given, definition.symbolic, robot.symbol_table).text(definition.body)
+        source = definition.real.source if definition.real else None
+        text = Infix(given, definition.symbolic, robot.symbol_table).text(source or definition.body)
         if isinstance(definition, Function):
-            yield f"{noun} {constraint.name}: {in_unit(text, definition.places)}."
+            yield f"{noun} {constraint.name}: {text if source else in_unit(text, definition.places)}."
         elif constraint.cost == INFINITE:
             yield f"Rule {constraint.name}: {text}."
         else:

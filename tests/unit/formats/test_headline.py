@@ -30,6 +30,7 @@ EPOCHS = (
         ({"verdict": Verdict.OPTIMAL, "cost": Decimal("-1234567.50")},
          "optimal solution for all 16 robots, cost -1,234,567.50"),
         ({"cost": 0}, "solution for all 16 robots"),
+        ({"cost": Decimal("0.00")}, "solution for all 16 robots, cost 0.00"),
         ({"verdict": Verdict.OPTIMAL, "withdrawn": SIX}, "10 of 16 fly (proven maximum)"),
         ({"withdrawn": SIX}, "10 of 16 fly (not proven to be the maximum)"),
         ({"withdrawn": SIX, "lost": SIX[:2]}, "10 of 16 fly (not proven to be the maximum; 2 lost)"),

@@ -84,6 +84,9 @@ def test_numbers_that_are_not_allowed() -> None:
         for wrong in (-1, float("nan"), float("inf")):
             with pytest.raises(ValueError, match=f"^{name}=.* is not allowed; expected 0 or more seconds$"):
                 options(**{name: wrong})
+    for wrong in (-1, float("nan")):
+        with pytest.raises(ValueError, match=r"^refine=.* is not allowed; expected a number of 0 or more$"):
+            options(refine=wrong)
     for name in ("seed", "delay", "spares", "cache"):
         with pytest.raises(TypeError, match=f"^{name}=None is not allowed"):
             options(**{name: None})

@@ -17,6 +17,7 @@ from robochoc.privacy import Kind, privacy_of
 from robochoc.seats import GameOptions, Limits, header_of, play
 from robochoc.seats.moves import PlayerError
 from robochoc.seats.report import cost_shares
+from robochoc.seats.words import problem_in_words
 from robochoc.solver.errors import UnsupportedError
 from robochoc.verification.checker import assignment_cost
 from tests.support.cost_problems import random_cost_team
@@ -43,6 +44,11 @@ def test_real_variables_have_values_on_their_grids() -> None:
     model.minimize((x - 2.5) ** 2 + (x - y + 3) ** 2 + abs(y - 4))
     report = play(model.team, GameOptions(others="optimal", rounds=1))
     assert report.cost == report.optimum == model.solve("dpop", refine=math.inf).cost
+    report = play(model.team, GameOptions(others="script:0", rounds=1))
+    assert math.fsum(one.regret or 0 for one in report.seats) == pytest.approx(report.regret)
+    words = problem_in_words(model.team, "A")
+    assert "A.x is one of: 0.0 1.25 2.5 3.75 5.0 6.25 7.5 8.75 10.0." in words
+    assert "(A.x - 2.5) ^ 2" in words
 
 
 @pytest.mark.parametrize("protocol", ["dsa", "mgm", "dsa-sdp", "mixed-dsa", "regret-matching"])
