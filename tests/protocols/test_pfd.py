@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from robochoc.generators.swarm import swarm
@@ -118,6 +120,17 @@ def test_the_cost_of_the_best_position_never_rises() -> None:
         )
         costs.append((outcome.cost is None, outcome.cost or 0))
     assert costs == sorted(costs, reverse=True)
+
+
+@pytest.mark.parametrize("protocol", ["pfd", "c-cocoa"])
+def test_the_network_runtime_finds_the_same_answer_as_the_simulator(protocol: str) -> None:
+    settings = {"cycles": "3", "particles": "3"} if protocol == "pfd" else {}
+    options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, settings=settings)
+    simulated, networked = (
+        solve(apart(), replace(options, runtime=runtime)) for runtime in (Runtime.SIMULATOR, Runtime.NETWORK)
+    )
+    assert (networked.cost, networked.lost) == (simulated.cost, ())
+    assert networked.assignment == simulated.assignment
 
 
 def test_robots_may_have_real_and_other_variables() -> None:

@@ -119,8 +119,10 @@ def profile_of(robot: Robot) -> Profile:
 
 
 def ranges_of(domain: Domain) -> Ranges:
-    """Return the ranges of `domain` for sending."""
-    return tuple((part[0], part[-1]) for part in domain.ranges)
+    """Return the ranges of the possible values of `domain` for sending."""
+    possible = domain.possible
+    ranges = (possible,) if isinstance(possible, range) else possible.ranges
+    return tuple((part[0], part[-1]) for part in ranges)
 
 
 def domain_of(name: str, ranges: Ranges) -> Domain:
