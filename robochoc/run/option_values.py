@@ -86,8 +86,9 @@ def samples(name: str, value: object) -> int:
     """Convert a number of samples."""
     from robochoc.model.sampling import sample_number  # noqa: PLC0415 - start-up: rarely needed
 
+    number = integer(name, value)
     try:
-        return sample_number(integer(name, value))
+        return sample_number(number)
     except ValueError as invalid:
         raise OptionError(f"{name}: {invalid}") from None
 
