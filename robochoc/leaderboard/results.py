@@ -14,6 +14,7 @@ from robochoc.experiments.task import Status
 from robochoc.formats.diagnostics import InvalidInputError, invalid_input, shortened
 from robochoc.leaderboard.certificates import published
 from robochoc.leaderboard.instances import SET_VERSION
+from robochoc.model.outcome import Verdict
 from robochoc.system.files import write_atomically
 
 LARGEST_FILE = 256 * 2**20
@@ -89,7 +90,7 @@ class RunResult(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     protocol: Name
     status: Status
     reason: Text | None = None
-    verdict: Name | None = None
+    verdict: Verdict | None = None
     cost: Cost | None = None
     assignment: dict[str, Cost] = {}
     messages: Count | None = None

@@ -16,6 +16,7 @@ from robochoc.journal.reader import read_journal
 from robochoc.leaderboard.instances import SET_VERSION, Instance
 from robochoc.leaderboard.results import FORMAT, Budget, Entrant, LeaderboardResults, RunResult
 from robochoc.leaderboard.saved_runs import FAILED, SavedRuns
+from robochoc.model.outcome import Verdict
 from robochoc.privacy import Measure, PrivacyError, privacy_of
 from robochoc.run.distributed import COUNTED_LIMIT
 from robochoc.run.options import ScheduleName
@@ -126,7 +127,7 @@ def _result(instance: Instance, protocol: Entrant, row: Row, *, times: bool) -> 
         protocol=protocol.name,
         status=row.status,
         reason=None if row.reason is None else row.reason[:1000],
-        verdict=row.verdict,
+        verdict=None if row.verdict is None else Verdict(row.verdict),
         cost=int(row.cost) if row.cost is not None and is_answer else None,
         assignment=row.assignment if is_answer else {},
         messages=row.messages,
@@ -165,5 +166,8 @@ def failures(results: LeaderboardResults) -> Iterator[str]:
 
 
 def comparable(run: RunResult) -> RunResult:
-    """Return a run without its time, for comparisons of two runs."""
-    return msgspec.structs.replace(run, cpu_s=None)
+    """Return a run without what depends on the machine, for comparisons of two runs.
+
+    This is its time, and the reason of a refusal, which counts the installed protocols that accept the problem.
+    """
+    return msgspec.structs.replace(run, cpu_s=None, reason=None if run.status == Status.REFUSED else run.reason)

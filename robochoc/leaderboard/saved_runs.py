@@ -85,7 +85,7 @@ class SavedRuns:
             raise invalid_input(path, "has the runs of another command, which was interrupted", hint)
         size = len(command)
         with suppress(msgspec.MsgspecError, UnicodeDecodeError, RecursionError):  # an incomplete line is the last one
-            for line in lines[1:]:
+            for line in (line for line in lines[1:] if line.endswith(b"\n")):
                 run = msgspec.json.decode(line, type=RunResult)
                 self.found[run.instance, run.protocol] = run
                 size += len(line)

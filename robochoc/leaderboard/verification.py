@@ -152,7 +152,7 @@ class Repetition:
                 limit = f"{self._budget.time_s:g} s: increase --timeout"
                 self.remarks.append(f"{run} not compared: it met the time limit of {limit}")
             elif fields := _differences(comparable(before), comparable(now)):
-                yield f"{run}: another {', '.join(fields)}"
+                yield f"{run}: repeated with different {', '.join(fields)}"
 
 
 def _differences(before: RunResult, now: RunResult) -> list[str]:

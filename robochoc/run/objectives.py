@@ -209,7 +209,7 @@ def _no_front(team: Team, protocol: str) -> UnsupportedError:
     order, names = ",".join(team.objectives), ", ".join(team.objectives)
     return UnsupportedError(
         f"{team.name} has several objectives ({names}), and {protocol} minimises a single cost: add"
-        f" --objectives weighted:{weights} or --objectives lexicographic:{order}, or choose --protocol {FRONT_PROTOCOL}"
+        f" --objectives weighted:{weights} or --objectives lexicographic:{order}, or use the protocol {FRONT_PROTOCOL}"
     )
 
 

@@ -163,6 +163,8 @@ def unknown_protocol(name: str) -> str:
     """Return the error text for the unknown protocol `name`, with suggestions."""
     if instead := PROTOCOLS.get(name.lower()):
         return f"no protocol {name!r} is installed; instead of this algorithm of pyDCOP, use {instead}"
+    if name.lower() in {CENTRAL, AUTO}:
+        return f"{name!r} cannot be used here; name a distributed protocol: 'robochoc protocols' lists them"
     return not_installed_message(GROUP, "protocol", name, also=(CENTRAL, AUTO), listed_by="robochoc protocols")
 
 

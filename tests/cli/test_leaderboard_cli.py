@@ -127,6 +127,7 @@ def test_wrong_usage() -> None:
     with cases() as each:
         for words, message in [
             (["run", "dqop"], "did you mean 'dpop'"),
+            (["run", "central"], "'central' cannot be used here; name a distributed protocol"),
             (
                 ["run", "nope:Nope"],
                 "nope:Nope cannot be imported: ModuleNotFoundError: No module named 'nope'",

@@ -117,6 +117,12 @@ def test_every_runtime_finds_the_same_answer(runtime: Runtime) -> None:
     assert (outcome.cost, outcome.verdict, outcome.reason) == (expected.cost, Verdict.SOLUTION, BEST_FOR_SAMPLES)
 
 
+def test_listed_optima_are_those_of_the_samples() -> None:
+    team = fleet(3).team
+    outcome = solve(team, replace(SIMULATED, protocol="list-dpop", samples=20))
+    assert "there is no other optimum of the samples" in outcome_report(team, outcome)
+
+
 def test_a_recorded_run_with_samples_is_replayed() -> None:
     assert identical(replay(recorded(fleet(3).team, replace(SIMULATED, samples=20, seed=4))))
 

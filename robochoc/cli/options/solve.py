@@ -97,8 +97,9 @@ class SampleNumber(WholeNumber):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ANN401 - click's signature
         """Return the number, or fail with the next larger valid number."""
-        from robochoc.model.sampling import sample_number
+        from robochoc.model.sampling import MOST_SAMPLES, sample_number
 
+        self.max = MOST_SAMPLES
         try:
             return sample_number(super().convert(value, param, ctx))
         except ValueError as invalid:

@@ -453,16 +453,16 @@ def _listed(team: Team, outcome: Outcome, places: MapPlaces) -> list[str]:
     """Return the listed optima except the first, which is the assignment."""
     if outcome.optima is None:
         return []
-    what = "solution" if outcome.verdict == Verdict.SOLUTION else "optimum"
+    sampled = outcome.reason == BEST_FOR_SAMPLES
+    one, many = ("optimum", "optima") if sampled or outcome.verdict == Verdict.OPTIMAL else ("solution", "solutions")
+    of = " of the samples" if sampled else ""
     number, others = Decimal(outcome.optima.number), outcome.optima.assignments[1:]
     if number == 1:
-        return [f"  there is no other {what}"]
+        return [f"  there is no other {one}{of}"]
     shown = f"the first {len(others) + 1:,}" if len(others) + 1 < number else "all"
-    lines = [
-        f"  one of {number:,} {'solutions' if what == 'solution' else 'optima'}; {shown} are listed, the others are:"
-    ]
-    for place, one in enumerate(others, start=2):
-        lines += [f"  {place:,}.", *_values(team, outcome.labelled(one), places.places_of(one))]
+    lines = [f"  one of {number:,} {many}{of}; {shown} are listed, the others are:"]
+    for place, other in enumerate(others, start=2):
+        lines += [f"  {place:,}.", *_values(team, outcome.labelled(other), places.places_of(other))]
     return lines
 
 

@@ -190,7 +190,7 @@ def checked_run(blank: RunResult, team: Team, answer: PeerAnswer, algorithm: Alg
         claimed_cost=claimed_cost,
     )
     if fault and claimed == Verdict.NO_SOLUTION == best.verdict:
-        return msgspec.structs.replace(run, status=Status.DONE, reason=None, verdict=claimed)
+        return msgspec.structs.replace(run, status=Status.DONE, reason=None, verdict=Verdict.NO_SOLUTION)
     if fault:
         return run
     assignment = {name: answer.assignment[name] for name in team.variables}

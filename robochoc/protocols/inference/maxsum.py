@@ -111,7 +111,7 @@ class MaxSumSettings(CycleSettings, frozen=True):
 
     `split`: each function becomes two, and the share of each entry is drawn from `split` to 1 - `split`. 0: no split.
     `reweight`: the weight of functions in tree-reweighted Max-Sum. 1: plain Max-Sum.
-    `diffusion`: true for max-sum diffusion, which has a lower bound; not with `split` or `reweight`.
+    `diffusion`: `yes` for max-sum diffusion, which has a lower bound; not with `split` or `reweight`.
     """
 
     damping: float = 0.5

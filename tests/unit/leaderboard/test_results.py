@@ -60,7 +60,7 @@ def test_an_interrupted_command_continues_with_the_same_bytes(results: Leaderboa
     command = command_line(chosen, FEW, BUDGET, seed=0, times=False)
     with pytest.raises(KeyboardInterrupt), Interrupted(path, command) as saved:
         run_leaderboard(chosen, FEW, BUDGET, saved=saved)
-    path.write_bytes(path.read_bytes()[:-3])  # as if the last line were written in part
+    path.write_bytes(path.read_bytes()[:-1])  # as if the last line were written in part
     done: list[int] = []
     with SavedRuns(path, command) as saved:
         assert list(saved.found.values()) == results.runs[:3]
@@ -92,6 +92,12 @@ def test_answers_are_right_and_runs_are_repeated(results: LeaderboardResults) ->
     assert 0 < loss <= 1
 
 
+def test_the_reason_of_a_refusal_may_differ(results: LeaderboardResults) -> None:
+    """It names other protocols, so it depends on the installed packages."""
+    other = changed(results, "random-small-0", "afc-ng", reason="afc-ng does not support it; these do: another")
+    assert list(Repetition(other, None).changed_runs()) == []
+
+
 def changed(results: LeaderboardResults, instance: str, protocol: str, **values: Any) -> LeaderboardResults:  # noqa: ANN401
     runs = [
         msgspec.structs.replace(run, **values) if (run.instance, run.protocol) == (instance, protocol) else run
@@ -121,7 +127,7 @@ def test_wrong_answers_are_found(results: LeaderboardResults) -> None:
 
 def test_other_results_of_a_repeated_run_are_found(results: LeaderboardResults) -> None:
     altered = changed(results, "random-small-0", "mgm", messages=3)
-    assert list(Repetition(altered, None).changed_runs()) == ["mgm on random-small-0: another messages"]
+    assert list(Repetition(altered, None).changed_runs()) == ["mgm on random-small-0: repeated with different messages"]
 
 
 def test_repeated_runs_have_a_time_limit_of_their_own(results: LeaderboardResults) -> None:
@@ -131,7 +137,9 @@ def test_repeated_runs_have_a_time_limit_of_their_own(results: LeaderboardResult
     assert list(short.changed_runs()) == []
     assert short.unfinished == sum(run.status != Status.REFUSED for run in for_days.runs)
     assert "mgm on random-small-0 not compared: it met the time limit of 1e-06 s: increase --timeout" in short.remarks
-    assert list(Repetition(for_days, None).changed_runs()) == ["mgm on random-small-0: another messages"]
+    assert list(Repetition(for_days, None).changed_runs()) == [
+        "mgm on random-small-0: repeated with different messages"
+    ]
 
 
 def curve_of(results: LeaderboardResults, protocol: str) -> list[tuple[int, int]]:
@@ -180,7 +188,7 @@ def test_proofs_that_an_incomplete_protocol_claims_are_always_repeated(results: 
     assert list(wrong_answers(altered)) == []
     repetition = Repetition(altered, 0)
     assert [(run.instance, run.protocol) for run in repetition.runs] == [("random-small-0", "mgm")]
-    assert any("another verdict, cost" in line for line in repetition.changed_runs())
+    assert any("repeated with different verdict, cost" in line for line in repetition.changed_runs())
 
 
 def with_entrant(results: LeaderboardResults, **values: str) -> LeaderboardResults:

@@ -12,13 +12,14 @@ from robochoc.leaderboard.certificates import BEST_KNOWN, published
 from robochoc.leaderboard.results import Budget, Entrant, LeaderboardResults, RunResult
 from robochoc.leaderboard.scores import area, family_scores, gap, ranks_of
 from robochoc.leaderboard.tables import family_tables, holders, overall
+from robochoc.model.outcome import Verdict
 
 COSTS, HARD = "random-small-0", "coloring-hard-small-0"
 BEST = published()[COSTS].cost or 0
 BUDGET = Budget(messages=100)
 
 
-def answer(cost: int | None, curve: Sequence[tuple[int, int]] = (), verdict: str = "solution") -> RunResult:
+def answer(cost: int | None, curve: Sequence[tuple[int, int]] = (), verdict: Verdict = Verdict.SOLUTION) -> RunResult:
     return RunResult(
         instance=COSTS, protocol="a", status=Status.DONE, verdict=verdict, cost=cost, curve=list(curve), messages=50
     )
@@ -29,8 +30,8 @@ def test_gaps() -> None:
     assert gap(answer(BEST), best) == 0
     assert gap(answer(2 * BEST), best) == pytest.approx(0.5)
     assert gap(answer(-1), best) == 1
-    assert gap(answer(None, verdict="unknown"), best) == 1
-    assert gap(answer(BEST, verdict="unknown"), best) == 0
+    assert gap(answer(None, verdict=Verdict.UNKNOWN), best) == 1
+    assert gap(answer(BEST, verdict=Verdict.UNKNOWN), best) == 0
     zero = msgspec.structs.replace(best, cost=0, bound=0)
     assert gap(answer(0), zero) == 0
     assert gap(answer(7), zero) == 1
@@ -47,7 +48,7 @@ def test_answers_between_the_best_known_one_and_the_bound_have_no_gap() -> None:
 
 def test_areas() -> None:
     best = published()[COSTS]
-    assert area(answer(None, verdict="unknown"), best, BUDGET) == 1
+    assert area(answer(None, verdict=Verdict.UNKNOWN), best, BUDGET) == 1
     assert area(answer(BEST, [(0, BEST)]), best, BUDGET) == 0
     # Nothing for 10 messages, then half the gap for 30, then the optimum.
     assert area(answer(BEST, [(10, 2 * BEST), (40, BEST)]), best, BUDGET) == pytest.approx((10 + 15) / 100)
@@ -59,7 +60,7 @@ def test_areas_without_costs_and_with_changes() -> None:
     hard = published()[HARD]
     right = msgspec.structs.replace(answer(None), instance=HARD, verdict=hard.verdict)
     assert area(right, hard, BUDGET) == pytest.approx(0.5)
-    assert area(msgspec.structs.replace(right, verdict="unknown"), hard, BUDGET) == 1
+    assert area(msgspec.structs.replace(right, verdict=Verdict.UNKNOWN), hard, BUDGET) == 1
     assert area(answer(1), published()["dynamic-small-0"], BUDGET) is None
 
 
@@ -89,7 +90,9 @@ def ten_of_each(**factors: int) -> list[RunResult]:
             one = f"random-small-{seed}"
             best = published()[one].cost or 0
             cost = best * factor + (seed if factor > 1 else 0)
-            found.append(RunResult(instance=one, protocol=name, status=Status.DONE, verdict="solution", cost=cost))
+            found.append(
+                RunResult(instance=one, protocol=name, status=Status.DONE, verdict=Verdict.SOLUTION, cost=cost)
+            )
     return found
 
 
@@ -108,7 +111,7 @@ def test_the_best_are_those_that_are_not_significantly_worse() -> None:
 
 def test_protocols_without_answers_are_not_the_best() -> None:
     nothing = [
-        RunResult(instance=f"random-small-{seed}", protocol=name, status=Status.LIMIT, verdict="unknown")
+        RunResult(instance=f"random-small-{seed}", protocol=name, status=Status.LIMIT, verdict=Verdict.UNKNOWN)
         for seed in range(10)
         for name in ("a", "b")
     ]
