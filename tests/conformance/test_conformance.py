@@ -165,8 +165,9 @@ def test_a_turned_link_takes_a_variable_out_of_sight(protocol: str) -> None:
     """Domains were once compiled from the team in the files: eleven protocols found no solution, five crashed."""
     team = turned_interface()
     orders: list[Order | tuple[str, ...]] = [("C", "A", "B"), ("B", "C", "A"), Order.RANDOM]
+    settings = {"cycles": "20"} if protocol == "p-dsa" else {}  # in a few cycles, both ends may always move together
     for order in orders:
-        options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, order=order)
+        options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, order=order, settings=settings)
         assert check_against_brute_force(team, options).verdict is Verdict.SOLUTION
 
 

@@ -113,11 +113,12 @@ def loose_team(protocol: str, chance: Random, *, costs: bool = False) -> Team:
 def check_against_brute_force(team: Team, options: Options, solver: AceProcess | None = None) -> Outcome:
     """Solve `team` and return the outcome, after a comparison with brute force. `solve` checks the assignment.
 
-    An incomplete protocol may find no answer, or one that is not the best. What it claims has to be true.
+    An incomplete protocol may find no answer, or one that is not the best. What it claims has to be true. Its search is
+    short, unless the options have settings of their own.
     """
     protocol = protocol_named(options.protocol)
     if hasattr(protocol.settings, "cycles"):
-        options = replace(options, settings=short_settings(options.protocol, 20))
+        options = replace(options, settings={**short_settings(options.protocol, 20), **options.settings})
     if not protocol.traits.complete and not protocol.traits.encrypted_tables:
         options = replace(options, messages=ENOUGH)
     outcome = solve(team, options, solver=solver)
