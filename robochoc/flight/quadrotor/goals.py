@@ -147,6 +147,8 @@ def check_separation(
                 f", which requires {needed_distance(distance):g} m" if gap >= distance - SLACK_M else ""
             )
             step = "use a smaller distance, or a larger scale" if distance > DISTANCE_MIN_M else "use a larger scale"
+            if not gap and what == "goals":
+                step = "add a constraint that keeps the drones apart"
             raise ValueError(
                 f"the {what} of {names[first]} and {names[second]} are {apart} m apart{heights}, and {asked}: {step}"
             )
