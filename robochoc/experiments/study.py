@@ -141,6 +141,9 @@ def study_of(tables: Mapping[str, Any], place: Place) -> Study:
     named = distinct([(setup, limit) for setup, _, limit in setups])
     if clash := _same_labels(named, setups):
         raise place.below("runs").mistake("label", f"{shortened(clash)} is the label of several ways to run")
+    if len({setup.objectives for setup in named}) > 1:
+        hint = "use one for all runs, and a study for each"
+        raise place.below("runs").mistake("objectives", "costs of different objectives cannot be compared", hint)
     repeat = tables.get("repeat", 1)
     if type(repeat) is not int or not 1 <= repeat <= MOST_REPETITIONS:
         raise place.mistake(

@@ -23,7 +23,8 @@ from robochoc.system.lazy_dataclass import dataclass
 
 DEFAULT_NUMBER = 1000
 """The number of samples if the user has not chosen one."""
-MOST_SAMPLES = 1_000_000
+MOST_SAMPLES = 10_000
+"""The maximum number of samples: time limits do not cover the seconds in which costs are computed for them."""
 MAX_OUTCOMES = 4096
 """The maximum number of joint outcomes over which an expectation is exact if the user has not chosen samples."""
 

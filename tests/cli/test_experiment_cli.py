@@ -316,10 +316,14 @@ def test_compare_combines_objectives_or_says_why_no_run_is_possible(tmp_path: Pa
 
 def test_objectives_of_a_study(tmp_path: Path) -> None:
     path = tmp_path / "study.toml"
-    path.write_text(SMALL.replace("[runs]", '[runs]\nobjectives = "energy"'))
-    refused = robochoc_within("experiment", "run", path)
-    assert (refused.returncode, refused.stdout) == (1, "")
-    assert "'energy' is not a way to combine objectives" in refused.stderr
+    for objectives, said in [
+        ('"energy"', "'energy' is not a way to combine objectives"),
+        ('["pareto", "lexicographic:a,b"]', "costs of different objectives cannot be compared"),
+    ]:
+        path.write_text(SMALL.replace("[runs]", f"[runs]\nobjectives = {objectives}"))
+        refused = robochoc_within("experiment", "run", path)
+        assert (refused.returncode, refused.stdout) == (1, "")
+        assert said in refused.stderr
 
 
 def test_what_compare_cannot_take_is_wrong_usage() -> None:

@@ -290,6 +290,8 @@ def test_goals_that_are_too_near_are_refused() -> None:
     flight = Flight(["a", "b"], PAIR, FlightConditions(distance=1.0))
     with pytest.raises(ValueError, match=r"the goals of a and b are 0\.50 m apart, and the minimum is 1 m"):
         flight.fly("up", {0: Goal((0.0, 0.0, 1.0)), 1: Goal((0.5, 0.0, 1.0))})
+    with pytest.raises(ValueError, match=r"are 0 m apart.*: add a constraint that keeps the drones apart"):
+        flight.fly("up", dict.fromkeys((0, 1), Goal((0.0, 0.0, 1.0))))
     with pytest.raises(ValueError, match=r"the homes of a and b are 2\.00 m apart"):
         Flight(["a", "b"], PAIR, FlightConditions(distance=2.5))
     with pytest.raises(ValueError, match="there is no drone with the number 2"):
