@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import pairwise
 
+from robochoc.experiments.task import Status
 from robochoc.leaderboard.certificates import Certificate
 from robochoc.leaderboard.results import RunResult
 from robochoc.model.outcome import Verdict
@@ -30,12 +31,22 @@ def wrong_claims(run: RunResult, team: Team, best: Certificate, traits: Traits |
     """
     if traits is not None:
         yield from _proof_faults(run, traits)
+    if not run.is_by_peer:
+        yield from _status_faults(run)
     if not run.is_by_peer and run.verdict is not None and None in {run.messages, run.bytes, run.ncccs}:
         yield "has a verdict, but not all of messages, bytes and ncccs"
     if not best.scenario:
         yield from _curve_faults(run, best, is_maximised=any(robot.costs.maximize for robot in team.robots))
     elif run.curve:
         yield "has a curve, although the problem changes"
+
+
+def _status_faults(run: RunResult) -> Iterator[str]:
+    """Yield the contradictions of status, verdict and answer: only a run that is done has a verdict."""
+    if (run.status == Status.DONE) != (run.verdict not in {None, Verdict.UNKNOWN}):
+        yield f"has the status {run.status}, but the verdict {run.verdict or 'none'}"
+    if run.status == Status.REFUSED and (run.cost is not None or run.assignment or run.messages is not None):
+        yield "was refused, but has an answer or messages"
 
 
 def _proof_faults(run: RunResult, traits: Traits) -> Iterator[str]:

@@ -144,7 +144,8 @@ def test_wrong_usage() -> None:
             (["run", "evil:"], "'evil:' is not of the form MODULE:CLASS"),
             (["run", "json:JSONDecoder"], "json:JSONDecoder is not a subclass of Protocol"),
             (["run", "dpop", "--budget", "hours=3"], "'hours=3' is not one of messages, ncccs, cycles, time"),
-            (["run", "dpop", "--budget", "messages=0"], "--budget: Expected `int` >= 1"),
+            (["run", "dpop", "--budget", "messages=0"], "--budget: 'messages=0' needs whole numbers of 1 or more"),
+            (["run", "dpop", "--budget", "messages=nan"], "--budget: 'messages=nan' needs whole numbers of 1 or more"),
             (["run", "dpop", "--family", "rndom"], "did you mean 'random'"),
             (["export", "random-small-99"], "did you mean 'random-small-9'"),
         ]:

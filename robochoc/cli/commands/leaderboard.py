@@ -408,5 +408,5 @@ def _budget(words: str) -> Budget:
         given[name] = value
     try:
         return msgspec.convert({BUDGET[name]: value for name, value in given.items()}, Budget, strict=False)
-    except msgspec.ValidationError as wrong:
-        raise click.UsageError(f"--budget: {wrong}.") from None
+    except msgspec.ValidationError:
+        raise click.UsageError(f"--budget: {words!r} needs whole numbers of 1 or more; time has seconds.") from None

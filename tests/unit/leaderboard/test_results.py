@@ -164,6 +164,9 @@ def test_contradictions_are_found_without_a_repetition(results: LeaderboardResul
         ("dynamic-small-0", "dpop", {"curve": [(1, 5)]}, "has a curve, although the problem changes"),
         ("coloring-hard-small-0", "mgm", {"curve": [(1, 5)]}, "has a curve, although the problem has no costs"),
         ("random-small-0", "afc-ng", {"verdict": "optimal"}, "the protocol does not minimise costs"),
+        ("random-small-0", "afc-ng", {"messages": 5}, "was refused, but has an answer or messages"),
+        ("random-small-0", "dpop", {"status": "limit"}, "has the status limit, but the verdict optimal"),
+        ("random-small-0", "dpop", {"verdict": "unknown"}, "has the status done, but the verdict unknown"),
     ]
     with cases() as each:
         for instance, protocol, values, fault in wrong:
@@ -183,12 +186,12 @@ def test_profits_that_are_maximised_rise_along_the_curve() -> None:
 
 def test_proofs_that_an_incomplete_protocol_claims_are_always_repeated(results: LeaderboardResults) -> None:
     best = next(run for run in results.runs if (run.instance, run.protocol) == ("random-small-0", "dpop"))
-    answer = {"verdict": "optimal", "cost": best.cost, "assignment": best.assignment}
+    answer = {"status": "done", "verdict": "optimal", "cost": best.cost, "assignment": best.assignment}
     altered = changed(results, "random-small-0", "mgm", **answer, curve=[(5, best.cost)])
     assert list(wrong_answers(altered)) == []
     repetition = Repetition(altered, 0)
     assert [(run.instance, run.protocol) for run in repetition.runs] == [("random-small-0", "mgm")]
-    assert any("repeated with different verdict, cost" in line for line in repetition.changed_runs())
+    assert any("repeated with different status, verdict, cost" in line for line in repetition.changed_runs())
 
 
 def with_entrant(results: LeaderboardResults, **values: str) -> LeaderboardResults:
