@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import fcntl
 import os
+import stat
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -73,6 +74,8 @@ class SavedRuns:
             os.close(self._file)
 
     def _read(self, path: Path, command: bytes) -> None:
+        if not stat.S_ISREG(os.fstat(self._file).st_mode):
+            raise invalid_input(path, "is not a regular file", "delete it, or choose another -o")
         try:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:

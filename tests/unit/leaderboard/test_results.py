@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -78,6 +79,9 @@ def test_an_interrupted_command_continues_with_the_same_bytes(results: Leaderboa
     with SavedRuns(path, other) as saved:
         saved.add(msgspec.structs.replace(results.runs[0], status=Status.CRASHED))
     assert not path.exists()  # a failed run is repeated
+    os.mkfifo(path)
+    with pytest.raises(InvalidInputError, match="is not a regular file"):
+        SavedRuns(path, other)
 
 
 def test_answers_are_right_and_runs_are_repeated(results: LeaderboardResults) -> None:
