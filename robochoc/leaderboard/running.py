@@ -18,6 +18,7 @@ from robochoc.leaderboard.results import FORMAT, Budget, Entrant, LeaderboardRes
 from robochoc.leaderboard.saved_runs import FAILED, SavedRuns
 from robochoc.model.outcome import Verdict
 from robochoc.privacy import Measure, PrivacyError, privacy_of
+from robochoc.run.alternatives import without_alternatives
 from robochoc.run.distributed import COUNTED_LIMIT
 from robochoc.run.options import ScheduleName
 from robochoc.run.registry import installed_protocol, installed_spelling, protocol_named
@@ -126,7 +127,7 @@ def _result(instance: Instance, protocol: Entrant, row: Row, *, times: bool) -> 
         instance=instance.name,
         protocol=protocol.name,
         status=row.status,
-        reason=None if row.reason is None else row.reason[:1000],
+        reason=_reason(row.reason),
         verdict=None if row.verdict is None else Verdict(row.verdict),
         cost=int(row.cost) if row.cost is not None and is_answer else None,
         assignment=row.assignment if is_answer else {},
@@ -137,6 +138,11 @@ def _result(instance: Instance, protocol: Entrant, row: Row, *, times: bool) -> 
         privacy=_privacy(row.journal) if row.journal else None,
         cpu_s=row.cpu_s if times else None,
     )
+
+
+def _reason(reason: str | None) -> str | None:
+    """Return a reason without names of other protocols: their number depends on the installed packages."""
+    return None if reason is None else without_alternatives(reason)[:1000]
 
 
 def _privacy(journal: bytes) -> float | None:
@@ -166,8 +172,5 @@ def failures(results: LeaderboardResults) -> Iterator[str]:
 
 
 def comparable(run: RunResult) -> RunResult:
-    """Return a run without what depends on the machine, for comparisons of two runs.
-
-    This is its time, and the reason of a refusal, which counts the installed protocols that accept the problem.
-    """
-    return msgspec.structs.replace(run, cpu_s=None, reason=None if run.status == Status.REFUSED else run.reason)
+    """Return a run without its time and names of other protocols, for comparisons of two runs."""
+    return msgspec.structs.replace(run, cpu_s=None, reason=_reason(run.reason))

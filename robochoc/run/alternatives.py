@@ -22,6 +22,8 @@ from robochoc.solver.weighted import MAX_TOTAL_COST
 
 MOST_NAMED = 3
 """The maximum number of protocols named in a refusal. `robochoc protocols` lists the others."""
+_OTHERS = "; these do: "
+_NONE = "; no protocol"
 
 
 def alternatives(
@@ -56,11 +58,16 @@ def alternatives(
         others = (
             f", and {len(names) - len(named)} more: 'robochoc protocols' lists them" if len(names) > len(named) else ""
         )
-        return f"; these do: {', '.join(named)} (--protocol){others}"
+        return f"{_OTHERS}{', '.join(named)} (--protocol){others}"
     if _central_solver_fits(team, options):
-        return f"; no protocol does, but the central solver (--protocol {CENTRAL})"
+        return f"{_NONE} does, but the central solver (--protocol {CENTRAL})"
     too_high = max_total(team, options) >= EXACT
-    return f"; no protocol that is installed does{' (scale the costs down)' if too_high else ''}"
+    return f"{_NONE} that is installed does{' (scale the costs down)' if too_high else ''}"
+
+
+def without_alternatives(reason: str) -> str:
+    """Return the reason of a refusal without the text of `alternatives`, which depends on the installed protocols."""
+    return reason.partition(_OTHERS)[0].partition(_NONE)[0]
 
 
 def _suited(names: Sequence[str], team: Team, options: Options) -> list[str]:

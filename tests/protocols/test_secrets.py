@@ -17,6 +17,7 @@ from robochoc.sniffer.recorded_messages import types_by_name
 from robochoc.solver.agent_problem import RunParameters
 from tests.support import golden
 from tests.support.cases import cases
+from tests.support.compiled import plain_python_only
 from tests.support.program import ROOT
 
 pytestmark = pytest.mark.usefixtures("quick_encryption")
@@ -71,6 +72,7 @@ def test_masked_fields_require_secret_keys() -> None:
         assert protocol_named(name).traits.secret_keys or not masks, name
 
 
+@plain_python_only  # it reads the sources
 def test_other_protocols_have_no_access_to_secrets() -> None:
     for name in protocol_names():
         protocol = protocol_named(name)
