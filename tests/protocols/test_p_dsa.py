@@ -6,7 +6,7 @@ from random import Random
 
 import pytest
 
-from robochoc.communication.simulator.schedule import RandomChannels
+from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
@@ -14,6 +14,7 @@ from robochoc.protocols.chance import UNIT
 from robochoc.protocols.key_stream import KeyStream, shuffled
 from robochoc.protocols.private.p_dsa import PDSA
 from robochoc.run import Options, Runtime, solve
+from robochoc.run.registry import protocol_named
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.errors import UnsupportedError
 from tests.support.cost_problems import with_costs
@@ -92,3 +93,11 @@ def test_a_robot_without_a_possible_value_ends_the_search() -> None:
     domains = dict.fromkeys("ABC", (1,))
     assert solve(with_costs(team_of(domains, [shared])), options_of(cycles="2")).cost == 1
     assert solve(with_costs(team_of(domains, [shared, alone])), options_of(cycles="2")).verdict == Verdict.NO_SOLUTION
+
+
+@pytest.mark.parametrize("protocol", ["pc-syncbb", "p-dsa", "p-mgm", "p-maxsum"])
+def test_a_domain_that_a_change_has_emptied_ends_the_search(protocol: str) -> None:
+    for empty in "AB":
+        domains = {name: () if name == empty else (1,) for name in "ABC"}
+        team = with_costs(team_of(domains, [priced("A", "B", {(1, 1): 1})]))
+        assert Simulation(team, protocol_named(protocol), Concurrent(seed=0)).search().verdict == Verdict.NO_SOLUTION

@@ -13,7 +13,6 @@ from robochoc.cli.options.paths import InputPath
 from robochoc.cli.options.value_types import Finite, Number, Seed, WholeNumber
 from robochoc.cli.reports.failures import invalid_input_fails
 from robochoc.cli.reports.progress import elapsed_time
-from robochoc.system.plain_text import counted
 
 if TYPE_CHECKING:
     from robochoc.generators.graphs import Graph
@@ -103,7 +102,8 @@ def write(make: Callable[[], Team | TeamOnMap], output: Path | None, *, replace:
         write_team(team, folder, replace=replace, extra_files=other_files)
     constraints = sum(len(robot.shared) for robot in team.robots)
     count = len(team.robots)
-    click.echo(f"{folder}: {counted(count, 'robot')}, {counted(constraints, 'constraint')}; {next_step(folder, count)}")
+    size = f"{count} robot{'s' * (count != 1)}, {constraints} constraint{'s' * (constraints != 1)}"
+    click.echo(f"{folder}: {size}; {next_step(folder, count)}")
     if ground:
         click.echo(f"{folder / GROUND_FILE}: cells of {ground.scale:g} m, and walls that drones fly around")
 

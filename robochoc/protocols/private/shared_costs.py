@@ -152,7 +152,7 @@ class SharedCostsProtocol(SharedArithmeticProtocol):
             agents = sorted(table.agents, key=ranks.__getitem__)
             axes = [*map(table.agents.index, agents), len(agents)]
             joined = table.joined().transpose(axes)
-            costs = joined.reshape(math.prod(joined.shape[:-1]), -1)
+            costs = joined.reshape(math.prod(joined.shape[:-1]), joined.shape[-1])
             rows = self.rows if len(agents) == 1 else self.wide_rows
             known = rows.setdefault(tuple(agents), [[0] * len(costs) for _ in range(size)])
             for place, index in self.places.items():
@@ -187,8 +187,11 @@ class SharedCostsProtocol(SharedArithmeticProtocol):
         received = [message for message in self.received() if isinstance(message, Sizes)]
         received.insert(self.rank, Sizes(self.problem.declared_count(self.problem.agent), [*self.announced_scopes]))
         self.sizes = [message.values for message in received]
-        if not all(0 < size <= MOST_VALUES for size in self.sizes):
+        if not all(0 <= size <= MOST_VALUES for size in self.sizes):
             raise ValueError("received an invalid number of values")
+        if 0 in self.sizes:  # all domains are empty after a change: nothing is left to search
+            self.conclude(Verdict.NO_SOLUTION)
+            return
         self.scopes = [self._ranks_of(rank, message.scopes) for rank, message in enumerate(received)]
         for names, rows in self.rows.items():
             if len(rows[0]) != self.sizes[self.order.rank[names[0]]]:
