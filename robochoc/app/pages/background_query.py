@@ -9,9 +9,7 @@ from nicegui import run
 
 from robochoc.app.log import log_error
 from robochoc.app.sketch.troubles import NotReadyError
-from robochoc.formats import InvalidInputError
-from robochoc.modelling.errors import ModelError
-from robochoc.solver.errors import UnsupportedError
+from robochoc.system.errors import RobochocError
 
 T = TypeVar("T")
 
@@ -26,7 +24,7 @@ async def run_query(query: Callable[..., T], *arguments: object) -> T | ErrorTex
     """Run a query in a thread; return its result or an error text, or None if the application is shutting down."""
     try:
         return await run.io_bound(query, *arguments)
-    except (NotReadyError, ModelError, InvalidInputError, UnsupportedError) as error:
+    except (NotReadyError, RobochocError) as error:
         return ErrorText(error)
     except Exception as fault:  # noqa: BLE001 - shown, and written to the error log
         return ErrorText(log_error(fault, getattr(query, "__name__", "query")))

@@ -72,7 +72,7 @@ def test_a_point_of_the_front_is_chosen_by_mouse_and_keyboard(
         assert tab.page.evaluate("document.documentElement.scrollWidth") <= 360
         _shown(tab, application, team, "decide")
         tab.page.wait_for_selector(".headline:has-text('point 6 of 8')")
-        _shown(tab, application, team, "seat")
+        _shown(tab, application, team, "play")
         tab.page.click("button:has-text('Start the game')")
         tab.page.wait_for_selector("text=there are several objectives (energy, risk)")
 
